@@ -1,0 +1,389 @@
+"""Every option of the program: each default once, checked once."""
+
+import dataclasses
+import enum
+from pathlib import Path
+from typing import Any, Self
+
+from resdepth_colmap.errors import ConfigError
+
+
+class StereoBackend(enum.StrEnum):
+    """Where initial depth comes from."""
+
+    AUTO = "auto"
+    COLMAP = "colmap"
+    CPU = "cpu"
+    EXISTING = "existing"
+
+
+class Device(enum.StrEnum):
+    """Where the network runs."""
+
+    AUTO = "auto"
+    CPU = "cpu"
+    CUDA = "cuda"
+    MPS = "mps"
+
+
+class Fuser(enum.StrEnum):
+    """Who makes the cloud."""
+
+    OPEN3D = "open3d"
+    COLMAP = "colmap"
+
+
+class InputVariant(enum.StrEnum):
+    """What the network sees (paper, section "Network Variants")."""
+
+    STEREO = "stereo"
+    MONO = "mono"
+    DEPTH_ONLY = "depth-only"
+    IMAGES_ONLY = "images-only"
+
+
+class Normalisation(enum.StrEnum):
+    """How a tile's inverse depth is scaled before the network sees it."""
+
+    BASELINE = "baseline"  # the paper's: times the baseline, minus the tile's mean
+    ROBUST = "robust"  # minus the tile's median, over half its 10-90 % spread
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Config:
+    """Base of the configurations: to and from plain mappings."""
+
+    @classmethod
+    def from_mapping(cls, mapping: dict[str, Any]) -> Self:
+        """Build from a mapping, as a weights header or a run record holds it.
+
+        Raises:
+            ConfigError: For a key that this configuration does not have.
+        """
+        fields = {field.name: field for field in dataclasses.fields(cls)}
+        for key in mapping:
+            if key not in fields:
+                known = ", ".join(fields)
+                raise ConfigError(f"unknown option {key!r}; known are: {known}.")
+        return cls(**mapping)
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Plain values only, ready for JSON."""
+        return {key: _plain(value) for key, value in vars(self).items()}
+
+    def _check(self, holds: bool, expected: str, **values: object) -> None:
+        if not holds:
+            shown = ", ".join(f"{key}={value!r}" for key, value in values.items())
+            raise ConfigError(f"{shown} but expected {expected}.")
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, enum.StrEnum | Path):
+        return str(value)
+    return value
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class StereoConfig(Config):
+    """The CPU PatchMatch. Names and meanings are those of COLMAP's options.
+
+    Attributes:
+        window_radius: Half width of the matching window, in pixels.
+        window_step: Sample every so many pixels of the window.
+        sigma_color: Spread of the bilateral weight in grey values (0..1).
+        num_iterations: Red-black sweeps over the image.
+        max_num_sources: Use at most so many of the sources that patch-match.cfg names.
+        max_image_size: Longest image side to match at, in pixels; -1 = as it is.
+        depth_min: Nearest depth, in workspace units; -1 = from the scene.
+        depth_max: Farthest depth, in workspace units; -1 = from the scene.
+        min_triangulation_angle: Least angle of an `__auto__` source, in degrees.
+        seed: Seed of the random hypotheses.
+    """
+
+    window_radius: int = 5
+    window_step: int = 2
+    sigma_color: float = 0.2
+    num_iterations: int = 6
+    max_num_sources: int = 6
+    max_image_size: int = -1
+    depth_min: float = -1.0
+    depth_max: float = -1.0
+    min_triangulation_angle: float = 1.0
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Check the ranges once, so that no later code has to."""
+        self._check(
+            1 <= self.window_radius <= 15, "1 to 15", window_radius=self.window_radius
+        )
+        self._check(
+            1 <= self.window_step <= self.window_radius,
+            "1 to the window radius",
+            window_step=self.window_step,
+        )
+        self._check(self.sigma_color > 0, "more than 0", sigma_color=self.sigma_color)
+        self._check(
+            self.num_iterations >= 1, "at least 1", num_iterations=self.num_iterations
+        )
+        self._check(
+            1 <= self.max_num_sources <= 32,
+            "1 to 32",
+            max_num_sources=self.max_num_sources,
+        )
+        self._check(
+            self.max_image_size == -1 or self.max_image_size >= 32,
+            "-1 or at least 32",
+            max_image_size=self.max_image_size,
+        )
+        given = self.depth_min > 0 or self.depth_max > 0
+        self._check(
+            not given or 0 < self.depth_min < self.depth_max,
+            "0 < depth_min < depth_max, both given or neither",
+            depth_min=self.depth_min,
+            depth_max=self.depth_max,
+        )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class NetworkConfig(Config):
+    """The U-Net (paper, section "Network Architecture").
+
+    Attributes:
+        levels: Down-sampling levels; 7 for tiles of 512 px, 5 for tiles of 128 px.
+        base_channels: Channels of the first level; they double with each level.
+        max_channels: Where the doubling stops.
+        variant: What the network sees.
+        num_sources: Warped second views (variants stereo and images-only).
+        valid: Give it the mask of pixels whose depth was real, not filled.
+        photo_consistency: Give it the local correlation of reference and warped view.
+        gate: Let it weigh its residual by a learned gate in 0..1.
+        confidence: Let it predict the scale of its own error.
+        normalisation: How inverse depth is scaled.
+    """
+
+    levels: int = 7
+    base_channels: int = 16
+    max_channels: int = 512
+    variant: InputVariant = InputVariant.STEREO
+    num_sources: int = 1
+    valid: bool = True
+    photo_consistency: bool = True
+    gate: bool = True
+    confidence: bool = True
+    normalisation: Normalisation = Normalisation.ROBUST
+
+    def __post_init__(self) -> None:
+        """Turn plain strings into their enums and check the ranges."""
+        for name, kind in (("variant", InputVariant), ("normalisation", Normalisation)):
+            value = getattr(self, name)
+            choices = [str(choice) for choice in kind]
+            self._check(value in choices, " or ".join(choices), **{name: value})
+            object.__setattr__(self, name, kind(value))
+        self._check(1 <= self.levels <= 9, "1 to 9", levels=self.levels)
+        self._check(
+            1 <= self.base_channels <= self.max_channels <= 1024,
+            "1 <= base_channels <= max_channels <= 1024",
+            base_channels=self.base_channels,
+            max_channels=self.max_channels,
+        )
+        self._check(1 <= self.num_sources <= 8, "1 to 8", num_sources=self.num_sources)
+
+    @classmethod
+    def paper(cls, variant: InputVariant = InputVariant.STEREO) -> Self:
+        """The network of the paper: 64 to 512 channels, no extra inputs or outputs."""
+        return cls(
+            base_channels=64,
+            variant=variant,
+            valid=False,
+            gate=False,
+            photo_consistency=False,
+            confidence=False,
+            normalisation=Normalisation.BASELINE,
+        )
+
+    @property
+    def uses_sources(self) -> bool:
+        """Whether warped second views are among the inputs."""
+        return self.variant in (InputVariant.STEREO, InputVariant.IMAGES_ONLY)
+
+    @property
+    def residual(self) -> bool:
+        """Whether the output is added to the initial inverse depth."""
+        return self.variant is not InputVariant.IMAGES_ONLY
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the input channels, in order."""
+        names = ["inverse_depth"] if self.residual else []
+        if self.variant is not InputVariant.DEPTH_ONLY:
+            names.append("reference")
+        if self.uses_sources:
+            names += [f"source_{index}" for index in range(self.num_sources)]
+        if self.valid:
+            names.append("valid")
+        if self.photo_consistency and self.uses_sources:
+            names.append("photo_consistency")
+        return tuple(names)
+
+    @property
+    def multiple_px(self) -> int:
+        """Input height and width must be multiples of this."""
+        return int(2**self.levels)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class RefineConfig(Config):
+    """How depth maps are refined.
+
+    Attributes:
+        input: Which maps to start from: auto (the fuller one), or a kind of map,
+            that is the word before ".bin" in its file name.
+        passes: How often to warp and refine (the paper's iter: 2).
+        tile_px: Side of a square tile, in pixels.
+        overlap_px: Overlap of neighbouring tiles, in pixels.
+        device: Where the network runs.
+        weights: Weights file; None = those shipped with the package.
+    """
+
+    input: str = "auto"
+    passes: int = 1
+    tile_px: int = 512
+    overlap_px: int = 128
+    device: Device = Device.AUTO
+    weights: Path | None = None
+
+    def __post_init__(self) -> None:
+        """Check the ranges once, so that no later code has to."""
+        self._check(1 <= self.passes <= 10, "1 to 10", passes=self.passes)
+        self._check(
+            self.tile_px >= 32 and self.tile_px % 32 == 0,
+            "a multiple of 32",
+            tile_px=self.tile_px,
+        )
+        self._check(
+            0 <= self.overlap_px <= self.tile_px // 2,
+            "0 to half a tile",
+            overlap_px=self.overlap_px,
+        )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class FuseConfig(Config):
+    """How refined maps become one cloud.
+
+    Attributes:
+        fuser: Ours on open3d, or COLMAP's own stereo_fusion.
+        min_num_views: Views that must agree on a point, its own one included.
+        max_depth_error: Largest relative difference of two views' depths.
+        max_reproj_error: Largest error of re-projection there and back, in pixels.
+        max_normal_error_deg: Largest angle between two views' normals.
+        min_confidence: Least confidence of a pixel (0..1); 0 = take all.
+        voxel_size: Side of the voxels that are averaged, in workspace units; 0 = off.
+        remove_outliers: Drop points far from their neighbours (open3d's statistical
+            rule: 20 neighbours, 2 standard deviations).
+    """
+
+    fuser: Fuser = Fuser.OPEN3D
+    min_num_views: int = 3
+    max_depth_error: float = 0.01
+    max_reproj_error: float = 2.0
+    max_normal_error_deg: float = 30.0
+    min_confidence: float = 0.0
+    voxel_size: float = 0.0
+    remove_outliers: bool = False
+
+    def __post_init__(self) -> None:
+        """Check the ranges once, so that no later code has to."""
+        self._check(
+            self.min_num_views >= 1, "at least 1", min_num_views=self.min_num_views
+        )
+        self._check(
+            0 < self.max_depth_error < 1,
+            "between 0 and 1",
+            max_depth_error=self.max_depth_error,
+        )
+        self._check(
+            self.max_reproj_error > 0,
+            "more than 0",
+            max_reproj_error=self.max_reproj_error,
+        )
+        self._check(
+            0 < self.max_normal_error_deg <= 180,
+            "0 to 180",
+            max_normal_error_deg=self.max_normal_error_deg,
+        )
+        self._check(
+            0 <= self.min_confidence <= 1, "0 to 1", min_confidence=self.min_confidence
+        )
+        self._check(self.voxel_size >= 0, "0 or more", voxel_size=self.voxel_size)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class SynthesisConfig(Config):
+    """Rendered rooms, to train on and to show with.
+
+    Attributes:
+        num_scenes: Rooms to render.
+        num_views: Views of each room, 2 to 12.
+        width_px: Image width.
+        height_px: Image height.
+        seed: Seed of the first room; room i has seed + i.
+    """
+
+    num_scenes: int = 1
+    num_views: int = 5
+    width_px: int = 640
+    height_px: int = 480
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Check the ranges once, so that no later code has to."""
+        self._check(self.num_scenes >= 1, "at least 1", num_scenes=self.num_scenes)
+        self._check(2 <= self.num_views <= 12, "2 to 12", num_views=self.num_views)
+        self._check(
+            min(self.width_px, self.height_px) >= 32,
+            "at least 32",
+            width_px=self.width_px,
+            height_px=self.height_px,
+        )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class TrainConfig(Config):
+    """How the network is trained.
+
+    Attributes:
+        steps: Optimiser steps in all.
+        batch_size: Crops a step.
+        crop_px: Side of a square crop, in pixels.
+        learning_rate: Peak of the one-cycle schedule of Adam.
+        weight_decay: Adam's weight decay.
+        checkpoint_steps: Save the state every so many steps.
+        seed: Seed of weights, crops and order.
+    """
+
+    steps: int = 3000
+    batch_size: int = 4
+    crop_px: int = 512
+    learning_rate: float = 1e-3
+    weight_decay: float = 1e-5
+    checkpoint_steps: int = 100
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Check the ranges once, so that no later code has to."""
+        self._check(self.steps >= 1, "at least 1", steps=self.steps)
+        self._check(self.batch_size >= 1, "at least 1", batch_size=self.batch_size)
+        self._check(
+            self.crop_px >= 32 and self.crop_px % 32 == 0,
+            "a multiple of 32",
+            crop_px=self.crop_px,
+        )
+        self._check(
+            self.learning_rate > 0, "more than 0", learning_rate=self.learning_rate
+        )
+        self._check(
+            self.checkpoint_steps >= 1,
+            "at least 1",
+            checkpoint_steps=self.checkpoint_steps,
+        )

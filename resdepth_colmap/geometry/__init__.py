@@ -1,0 +1,1 @@
+"""Mathematics of cameras and maps. No files."""

@@ -1,0 +1,1 @@
+"""Files: workspaces, models, maps, images, clouds. No torch."""

@@ -1,0 +1,1 @@
+"""The stages: each a loop over files round a pure function on arrays."""
