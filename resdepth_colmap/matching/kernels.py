@@ -17,6 +17,7 @@ from numba import njit, prange
 
 MAX_COST = np.float32(2.0)  # COLMAP's kMaxCost: 1 - NCC of perfectly opposite patches
 MIN_VARIANCE = np.float32(1e-5)  # COLMAP: below it a patch has no texture
+ZERO, ONE, SMALL = np.float32(0), np.float32(1), np.float32(1e-3)
 NUM_STATES = 9  # eight neighbours and the plane that the pixel has
 NUM_TRIALS = 6  # random and perturbed planes
 
@@ -131,18 +132,18 @@ def _window(reference, x, y, offsets, sigma_color, weights, values):
     total = np.float32(0)
     mean = np.float32(0)
     square = np.float32(0)
-    for k in range(offsets.shape[0]):
-        xs = min(max(x + np.int64(offsets[k, 0]), 0), width - 1)
-        ys = min(max(y + np.int64(offsets[k, 1]), 0), height - 1)
+    for k in range(offsets.shape[1]):
+        xs = min(max(x + np.int64(offsets[0, k]), 0), width - 1)
+        ys = min(max(y + np.int64(offsets[1, k]), 0), height - 1)
         value = reference[ys, xs]
         delta = value - center
-        weight = math.exp(offsets[k, 2] + delta * delta * color_factor)
+        weight = math.exp(offsets[2, k] + delta * delta * color_factor)
         weights[k] = weight
         values[k] = value
         total += weight
         mean += weight * value
         square += weight * value * value
-    for k in range(offsets.shape[0]):
+    for k in range(offsets.shape[1]):
         weights[k] /= total
     mean /= total
     return mean, max(square / total - mean * mean, np.float32(0))
@@ -164,20 +165,31 @@ def _plane_cost(x, y, w, gx, gy, A, b, pixels, width, height, offsets, weights, 
     uy0, uy1, uy2 = A[0, 1] + b[0] * gy, A[1, 1] + b[1] * gy, A[2, 1] + b[2] * gy
     x_last = np.float32(width) - np.float32(1.001)
     y_last = np.float32(height) - np.float32(1.001)
+    row = np.int32(width)
     source_mean = np.float32(0)
     source_square = np.float32(0)
     product = np.float32(0)
-    for k in range(offsets.shape[0]):
-        dx, dy = offsets[k, 0], offsets[k, 1]
-        inverse = np.float32(1.0) / max(u2 + ux2 * dx + uy2 * dy, np.float32(1e-3))
-        xs = min(max((u0 + ux0 * dx + uy0 * dy) * inverse, np.float32(0)), x_last)
-        ys = min(max((u1 + ux1 * dx + uy1 * dy) * inverse, np.float32(0)), y_last)
+    # Selects instead of min and max, and unsigned 32-bit indices, which need no test
+    # for negative ones: LLVM then vectorises the loop with gathers (twice as fast).
+    for k in range(offsets.shape[1]):
+        dx, dy = offsets[0, k], offsets[1, k]
+        z = u2 + ux2 * dx + uy2 * dy
+        z = z if z > SMALL else SMALL
+        inverse = ONE / z
+        xs = (u0 + ux0 * dx + uy0 * dy) * inverse
+        ys = (u1 + ux1 * dx + uy1 * dy) * inverse
+        xs = xs if xs > ZERO else ZERO
+        ys = ys if ys > ZERO else ZERO
+        xs = xs if xs < x_last else x_last
+        ys = ys if ys < y_last else y_last
         x0, y0 = np.int32(xs), np.int32(ys)
         ax, ay = xs - np.float32(x0), ys - np.float32(y0)
-        at = np.int64(y0) * width + np.int64(x0)
-        top = pixels[at] + ax * (pixels[at + 1] - pixels[at])
-        low = pixels[at + width]
-        low += ax * (pixels[at + width + 1] - low)
+        upper = np.uint64(np.uint32(y0 * row + x0))
+        lower = np.uint64(np.uint32(y0 * row + x0 + row))
+        top = pixels[upper]
+        top += ax * (pixels[upper + np.uint64(1)] - top)
+        low = pixels[lower]
+        low += ax * (pixels[lower + np.uint64(1)] - low)
         value = top + ay * (low - top)
         weighted = weights[k] * value
         source_mean += weighted
@@ -231,8 +243,8 @@ def start(reference, K, planes, costs, A, b, pixels, starts, sizes, offsets, w_r
     """Random planes, uniform in inverse depth, and their mean cost over the sources."""
     height, width = reference.shape
     for y in prange(height):
-        weights = np.empty(offsets.shape[0], np.float32)
-        values = np.empty(offsets.shape[0], np.float32)
+        weights = np.empty(offsets.shape[1], np.float32)
+        values = np.empty(offsets.shape[1], np.float32)
         for x in range(width):
             mean, variance = _window(
                 reference, x, y, offsets, sigma_color, weights, values
@@ -353,8 +365,8 @@ def sweep(reference, K, planes, costs, A, b, pixels, starts, sizes, offsets, w_r
     height, width = reference.shape
     num_sources = A.shape[0]
     for y in prange(height):
-        weights = np.empty(offsets.shape[0], np.float32)
-        values = np.empty(offsets.shape[0], np.float32)
+        weights = np.empty(offsets.shape[1], np.float32)
+        values = np.empty(offsets.shape[1], np.float32)
         states = np.empty((NUM_STATES, 3), np.float32)
         trials = np.empty((NUM_TRIALS, 3), np.float32)
         matrix = np.empty((NUM_STATES, num_sources), np.float32)

@@ -128,10 +128,10 @@ def _flat_images(
 
 
 def _window_offsets(config: StereoConfig) -> FloatMap:
-    """The window's samples: dx, dy and the logarithm of the spatial weight, (N, 3)."""
+    """The window's samples: dx, dy and the logarithm of the spatial weight, (3, N)."""
     radius = config.window_radius
     steps = np.arange(-radius, radius + 1, config.window_step, dtype=np.float32)
     dx, dy = (grid.ravel() for grid in np.meshgrid(steps, steps))
     # COLMAP: sigma_spatial is the window's radius.
     spatial = -(dx**2 + dy**2) / (2.0 * radius**2)
-    return np.stack([dx, dy, spatial], axis=1).astype(np.float32)
+    return np.stack([dx, dy, spatial]).astype(np.float32)

@@ -1,6 +1,7 @@
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 import pycolmap
 import pytest
 from hypothesis import given
@@ -8,6 +9,10 @@ from hypothesis import strategies as st
 
 from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.io.depth_map import read_depth_map, read_map_size, write_depth_map
+
+
+def _f32(values: object) -> npt.NDArray[np.float32]:
+    return np.array(values, dtype=np.float32)
 
 
 @given(height=st.integers(1, 40), width=st.integers(1, 40), seed=st.integers(0, 999))
@@ -37,7 +42,7 @@ def test_values_that_are_no_depth_are_neither_written_nor_read(tmp_path: Path) -
     values = np.array([[np.nan, np.inf, -1, 2]], dtype=np.float32)
     path = tmp_path / "map.bin"
     write_depth_map(path, values)
-    assert path.read_bytes() == b"4&1&1&" + np.float32([0, 0, 0, 2]).tobytes()
+    assert path.read_bytes() == b"4&1&1&" + _f32([0, 0, 0, 2]).tobytes()
     path.write_bytes(b"4&1&1&" + values.tobytes())
     np.testing.assert_array_equal(read_depth_map(path), [[0, 0, 0, 2]])
 
