@@ -1,0 +1,21 @@
+"""Laws of the progress listeners."""
+
+from __future__ import annotations
+
+from resdepth_colmap.pipeline.progress import Progress, SilentProgress
+
+
+def test_silence_accepts_any_report_and_says_nothing(capsys) -> None:
+    progress: Progress = SilentProgress()
+    with progress.stage("Matching", 3) as advance:
+        advance(0.5)
+        advance(10.0)
+    assert capsys.readouterr() == ("", "")
+
+
+def test_stages_may_be_nested_and_repeated() -> None:
+    progress = SilentProgress()
+    for _ in range(2):
+        with progress.stage("outer", 1) as outer, progress.stage("inner", 2) as inner:
+            inner(1.0)
+            outer(1.0)
