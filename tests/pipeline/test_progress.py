@@ -1,11 +1,13 @@
 """Laws of the progress listeners."""
 
-from __future__ import annotations
+import pytest
 
 from resdepth_colmap.pipeline.progress import Progress, SilentProgress
 
 
-def test_silence_accepts_any_report_and_says_nothing(capsys) -> None:
+def test_silence_accepts_any_report_and_says_nothing(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     progress: Progress = SilentProgress()
     with progress.stage("Matching", 3) as advance:
         advance(0.5)
