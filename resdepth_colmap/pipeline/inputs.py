@@ -1,0 +1,265 @@
+"""The network's inputs: one way to build them, for training and for use.
+
+First the whole view is warped and stacked (a source image cannot be cut into tiles);
+then each tile is cut out and normalised by itself, as the paper centres its patches.
+"""
+
+import math
+from typing import NamedTuple, Self
+
+import torch
+from torch import Tensor
+from torch.nn.functional import avg_pool2d
+
+from resdepth_colmap.config import NetworkConfig, Normalisation
+from resdepth_colmap.geometry.holes import fill_holes
+from resdepth_colmap.geometry.inverse_depth import invert_map
+from resdepth_colmap.geometry.warp import warp_to_reference
+from resdepth_colmap.scene import DepthMap
+
+NCC_WINDOW_PX = 7
+NCC_VARIANCE_FLOOR = 4e-6  # (half a grey level of 255) squared: weaker is noise
+NO_EVIDENCE = 0.5  # photo-consistency of a correlation of 0
+LEAST_VALID_SHARE = 0.05  # below it, filled pixels count in the statistics too
+LEAST_RELATIVE_SPREAD = 0.02  # of the median: a fronto-parallel wall has no spread
+STATISTICS_SIDE_PX = 256  # quantiles of more pixels than that squared cost only time
+DEFAULT_BASELINE_RATIO = 0.1  # baseline over depth where there is no second view
+
+
+class SourceTensors(NamedTuple):
+    """A second view.
+
+    Attributes:
+        gray: Grey values in 0..1, shape (B, 1, Hs, Ws).
+        K: K for index coordinates, shape (B, 3, 3), in pixels.
+        source_from_reference: Pose, shape (B, 3, 4), translation in units.
+    """
+
+    gray: Tensor
+    K: Tensor
+    source_from_reference: Tensor
+
+
+class ViewTensors(NamedTuple):
+    """A reference view with its initial depth, and the views to compare it with.
+
+    Attributes:
+        inverse_depth: Initial inverse depth, holes filled, shape (B, 1, H, W), 1/unit.
+        valid: Where the depth was real, not filled, shape (B, 1, H, W), bool.
+        gray: Grey values of the reference in 0..1, shape (B, 1, H, W).
+        K: K of the reference for index coordinates, shape (B, 3, 3), in pixels.
+        sources: Second views, best first; may be empty.
+    """
+
+    inverse_depth: Tensor
+    valid: Tensor
+    gray: Tensor
+    K: Tensor
+    sources: tuple[SourceTensors, ...]
+
+
+class InputStack(NamedTuple):
+    """All that the network may see of a view, inverse depth not yet normalised.
+
+    Attributes:
+        inverse_depth: Shape (B, 1, H, W), in 1/unit, > 0.
+        valid: Shape (B, 1, H, W), bool.
+        guidance: The channels of the network that follow "inverse_depth", in the order
+            of `NetworkConfig.channels`, shape (B, C, H, W); C may be 0.
+        baseline: Distance to the first source, shape (B, 1, 1, 1), in units.
+    """
+
+    inverse_depth: Tensor
+    valid: Tensor
+    guidance: Tensor
+    baseline: Tensor
+
+    def crop(self, top_px: int, left_px: int, height_px: int, width_px: int) -> Self:
+        """The same of a window of the view."""
+        rows = slice(top_px, top_px + height_px)
+        columns = slice(left_px, left_px + width_px)
+        return self._replace(
+            inverse_depth=self.inverse_depth[..., rows, columns],
+            valid=self.valid[..., rows, columns],
+            guidance=self.guidance[..., rows, columns],
+        )
+
+
+class Scaling(NamedTuple):
+    """How a tile's inverse depth is normalised: (inverse depth - offset) / scale.
+
+    Attributes:
+        offset: Shape (B, 1, 1, 1), in 1/unit.
+        scale: Shape (B, 1, 1, 1), in 1/unit, > 0.
+    """
+
+    offset: Tensor
+    scale: Tensor
+
+    def normalise(self, inverse_depth: Tensor) -> Tensor:
+        """Inverse depth, shape (B, 1, H, W), in 1/unit, to the network's numbers."""
+        return (inverse_depth - self.offset) / self.scale
+
+    def restore(self, normalised: Tensor) -> Tensor:
+        """The network's numbers to inverse depth, shape (B, 1, H, W), in 1/unit."""
+        return normalised * self.scale + self.offset
+
+
+def initial_tensors(depth: DepthMap) -> tuple[Tensor, Tensor]:
+    """The two tensors that a depth map becomes.
+
+    Args:
+        depth: Initial depth, shape (H, W), in units; 0 = hole.
+
+    Returns:
+        Inverse depth with its holes filled, shape (1, 1, H, W), float32, in 1/unit; and
+        where the depth was real, same shape, bool.
+
+    Raises:
+        ValueError: If no pixel is valid.
+    """
+    valid = torch.from_numpy(invert_map(depth) > 0)
+    filled = torch.from_numpy(invert_map(fill_holes(depth)))
+    return filled[None, None], valid[None, None]
+
+
+def build_inputs(view: ViewTensors, config: NetworkConfig) -> InputStack:
+    """Warp the second views and stack what the network of that configuration sees.
+
+    Args:
+        view: The view; sources beyond `config.num_sources` are not looked at, missing
+            ones become channels of zeros.
+        config: Says which channels.
+
+    Returns:
+        The stack, on the device and in the type of the view's inverse depth.
+    """
+    channels = {"reference": view.gray, "valid": view.valid.to(view.gray.dtype)}
+    if config.uses_sources:
+        warped = warp_sources(view, config.num_sources)
+        channels["photo_consistency"] = photo_consistency(view.gray, warped)
+        for index in range(config.num_sources):
+            is_there = index < len(warped)
+            image = warped[index][0] if is_there else torch.zeros_like(view.gray)
+            channels[f"source_{index}"] = image
+    names = [name for name in config.channels if name != "inverse_depth"]
+    nothing = view.inverse_depth[:, :0]
+    guidance = torch.cat([nothing, *(channels[name] for name in names)], dim=1)
+    return InputStack(view.inverse_depth, view.valid, guidance, _baseline(view))
+
+
+def warp_sources(view: ViewTensors, num_sources: int) -> list[tuple[Tensor, Tensor]]:
+    """The first sources in the reference camera: (image, inside) of each."""
+    return [
+        warp_to_reference(
+            source.gray,
+            view.inverse_depth,
+            view.K,
+            source.K,
+            source.source_from_reference,
+        )
+        for source in view.sources[:num_sources]
+    ]
+
+
+def photo_consistency(reference: Tensor, warped: list[tuple[Tensor, Tensor]]) -> Tensor:
+    """How badly the best warped source matches the reference, in 0..1.
+
+    (1 - NCC) / 2, with the zero-mean normalised cross-correlation of 7 x 7 windows: 0 =
+    same pattern, 0.5 = no relation, 1 = negative. Brightness and contrast do not
+    matter. Without texture the correlation goes to 0; where no source sees the pixel
+    the value is 0.5, as there is no evidence either way.
+
+    Args:
+        reference: Grey values, shape (B, 1, H, W).
+        warped: Of each source the image and where it is inside, shapes (B, 1, H, W).
+
+    Returns:
+        The least value of all sources, shape (B, 1, H, W).
+    """
+    best = torch.full_like(reference, math.inf)
+    for image, inside in warped:
+        value = 0.5 * (1.0 - _windowed_ncc(reference, image, inside))
+        best = torch.where(inside, torch.minimum(best, value), best)
+    return torch.where(torch.isinf(best), NO_EVIDENCE, best)
+
+
+def tile_scaling(stack: InputStack, kind: Normalisation) -> Scaling:
+    """The normalisation of a tile.
+
+    The statistics use real pixels only, unless these are too few.
+
+    Args:
+        stack: The tile, or a batch of tiles.
+        kind: Which statistics.
+
+    Returns:
+        Offset and scale of each tile of the batch.
+    """
+    step = max(1, max(stack.inverse_depth.shape[-2:]) // STATISTICS_SIDE_PX)
+    values = stack.inverse_depth[..., ::step, ::step].flatten(1)
+    counts = stack.valid[..., ::step, ::step].flatten(1)
+    enough = counts.float().mean(dim=1, keepdim=True) >= LEAST_VALID_SHARE
+    values = torch.where(counts | ~enough, values, math.nan)
+    if kind is Normalisation.BASELINE:
+        mean = values.nanmean(dim=1)
+        return Scaling(_per_tile(mean), 1.0 / stack.baseline)
+    levels = values.new_tensor([0.1, 0.5, 0.9])
+    low, median, high = torch.nanquantile(values, levels, dim=1)
+    spread = torch.maximum(0.5 * (high - low), LEAST_RELATIVE_SPREAD * median)
+    return Scaling(_per_tile(median), _per_tile(spread))
+
+
+def network_input(stack: InputStack, config: NetworkConfig) -> tuple[Tensor, Scaling]:
+    """What the network is fed for a tile (or a batch of tiles).
+
+    Args:
+        stack: The tile, cut from what `build_inputs` made.
+        config: The configuration that the stack was built for.
+
+    Returns:
+        The channels of `config.channels`, shape (B, C, H, W); and the scaling that
+        turns the network's output back into inverse depth, or true inverse depth into
+        the network's target.
+    """
+    scaling = tile_scaling(stack, config.normalisation)
+    if not config.residual:
+        return stack.guidance, scaling
+    normalised = scaling.normalise(stack.inverse_depth)
+    return torch.cat([normalised, stack.guidance], dim=1), scaling
+
+
+def _baseline(view: ViewTensors) -> Tensor:
+    if view.sources:
+        translation = view.sources[0].source_from_reference[..., 3]
+        return _per_tile(translation.norm(dim=-1)).to(view.inverse_depth)
+    mean = view.inverse_depth.mean(dim=(1, 2, 3))
+    return _per_tile(DEFAULT_BASELINE_RATIO / mean)
+
+
+def _per_tile(values: Tensor) -> Tensor:
+    return values[:, None, None, None]
+
+
+def _windowed_ncc(reference: Tensor, image: Tensor, inside: Tensor) -> Tensor:
+    """Correlation in -1..1 over those pixels of each window that are inside."""
+    weight = inside.to(reference.dtype)
+    share = _window_mean(weight).clamp(min=1.0 / NCC_WINDOW_PX**2)
+
+    def mean(values: Tensor) -> Tensor:
+        return _window_mean(values * weight) / share
+
+    mean_reference, mean_image = mean(reference), mean(image)
+    variance_reference = mean(reference**2) - mean_reference**2
+    variance_image = mean(image**2) - mean_image**2
+    covariance = mean(reference * image) - mean_reference * mean_image
+    floor = NCC_VARIANCE_FLOOR
+    product = (variance_reference.clamp(min=0) + floor) * (
+        variance_image.clamp(min=0) + floor
+    )
+    return (covariance / product.sqrt()).clamp(-1.0, 1.0)
+
+
+def _window_mean(values: Tensor) -> Tensor:
+    radius = NCC_WINDOW_PX // 2
+    return avg_pool2d(values, NCC_WINDOW_PX, stride=1, padding=radius)
