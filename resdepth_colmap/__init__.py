@@ -1,0 +1,74 @@
+"""Refine the depth maps of a COLMAP workspace, on any machine.
+
+The names below are the library; each is imported when it is first asked for, so that
+`import resdepth_colmap` is instant and needs neither torch nor open3d.
+"""
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from resdepth_colmap.config import FuseConfig, RefineConfig, StereoConfig
+    from resdepth_colmap.errors import ResDepthError
+    from resdepth_colmap.io.workspace import Workspace, open_workspace
+    from resdepth_colmap.network.weights import load_weights
+    from resdepth_colmap.pipeline.fuse import fuse_workspace
+    from resdepth_colmap.pipeline.refine import refine_view
+    from resdepth_colmap.pipeline.refine_workspace import refine_workspace
+    from resdepth_colmap.pipeline.run import RunConfig, run_refine
+    from resdepth_colmap.scene import Camera, Scene, View
+
+    __version__: str
+
+__all__ = [
+    "Camera",
+    "FuseConfig",
+    "RefineConfig",
+    "ResDepthError",
+    "RunConfig",
+    "Scene",
+    "StereoConfig",
+    "View",
+    "Workspace",
+    "fuse_workspace",
+    "load_weights",
+    "open_workspace",
+    "refine_view",
+    "refine_workspace",
+    "run_refine",
+]
+
+_MODULE_OF = {
+    "Camera": "scene",
+    "FuseConfig": "config",
+    "RefineConfig": "config",
+    "ResDepthError": "errors",
+    "RunConfig": "pipeline.run",
+    "Scene": "scene",
+    "StereoConfig": "config",
+    "View": "scene",
+    "Workspace": "io.workspace",
+    "fuse_workspace": "pipeline.fuse",
+    "load_weights": "network.weights",
+    "open_workspace": "io.workspace",
+    "refine_view": "pipeline.refine",
+    "refine_workspace": "pipeline.refine_workspace",
+    "run_refine": "pipeline.run",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("resdepth-colmap")
+    if name not in _MODULE_OF:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}.")
+    module = importlib.import_module(f"{__name__}.{_MODULE_OF[name]}")
+    # A module may bear the name of what it holds: the package's attribute is the name.
+    globals()[name] = getattr(module, name)
+    return globals()[name]
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__, "__version__"})

@@ -1,0 +1,71 @@
+"""The command `resdepth-colmap`: its commands, log, and what an error looks like."""
+
+import importlib
+from typing import Any
+
+import click
+
+from resdepth_colmap.cli.options import example
+from resdepth_colmap.errors import ResDepthError
+
+INTERRUPTED = 130  # the shell's code for a program that Ctrl-C ended
+COMMANDS = (
+    "refine",
+    "stereo",
+    "fuse",
+    "export",
+    "info",
+    "demo",
+    "synthesize",
+    "train",
+)
+
+
+class _Commands(click.Group):
+    """One module a command, imported when it is asked for."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """The commands, in the order a user meets them."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """The command of that name, None if there is none."""
+        if cmd_name not in COMMANDS:
+            return None
+        module = importlib.import_module(f"resdepth_colmap.cli.{cmd_name}")
+        command: click.Command = getattr(module, cmd_name)
+        return command
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run a command; our own errors are one line, all others are bugs."""
+        try:
+            return super().invoke(ctx)
+        except ResDepthError as error:
+            raise click.ClickException(" ".join(str(error).split())) from error
+        except KeyboardInterrupt:
+            click.echo("Interrupted; run the same command again to go on.", err=True)
+            ctx.exit(INTERRUPTED)
+
+
+def _plain_name(token: str) -> str:
+    """COLMAP's spelling of an option, --PatchMatchStereo.window_radius, is ours too."""
+    return token.removeprefix("PatchMatchStereo.").replace("_", "-")
+
+
+@click.group(
+    cls=_Commands,
+    epilog=example("info scene/dense", "refine scene/dense"),
+    context_settings={
+        "help_option_names": ["-h", "--help"],
+        "max_content_width": 100,
+        "token_normalize_func": _plain_name,
+    },
+)
+@click.option("-v", "--verbose", count=True, help="Say more; twice: say everything.")
+@click.option("-q", "--quiet", count=True, help="Warnings only; twice: errors only.")
+@click.version_option(package_name="resdepth-colmap", prog_name="resdepth-colmap")
+def main(verbose: int, quiet: int) -> None:
+    """Makes the depth maps of a COLMAP workspace right, on any machine."""
+    from resdepth_colmap.cli.log import start_log
+
+    start_log(verbose - quiet)

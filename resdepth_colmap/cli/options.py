@@ -1,0 +1,90 @@
+"""Options of the command line, made from the configurations: nothing is said twice.
+
+Name, type, default and help text of an option are those of the dataclass's attribute.
+"""
+
+import dataclasses
+import enum
+import inspect
+import re
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+
+from resdepth_colmap.config import Config
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+ConfigType = TypeVar("ConfigType", bound=Config)
+
+workspace_argument = click.argument("workspace", type=click.Path(path_type=Path))
+overwrite_option = click.option(
+    "--overwrite", is_flag=True, help="Do again what is finished and unchanged."
+)
+
+
+def example(*lines: str) -> str:
+    """The end of a help text: command lines to copy."""
+    shown = "\n".join(f"  resdepth-colmap {line}" for line in lines)
+    return f"\b\nExample:\n{shown}"  # \b: click leaves the line breaks
+
+
+def config_options(
+    kind: type[Config], *names: str, skip: tuple[str, ...] = ()
+) -> Callable[[Command], Command]:
+    """Give a command the options of a configuration.
+
+    Args:
+        kind: The configuration.
+        names: Which of its attributes, in this order; none = all.
+        skip: Attributes to leave out when `names` is empty.
+    """
+    fields = {field.name: field for field in dataclasses.fields(kind)}
+    helps = attribute_helps(kind)
+    chosen = names or tuple(name for name in fields if name not in skip)
+
+    def decorate(command: Command) -> Command:
+        for name in reversed(chosen):
+            command = _option(fields[name], helps.get(name, ""))(command)
+        return command
+
+    return decorate
+
+
+def build_config(kind: type[ConfigType], values: Mapping[str, Any]) -> ConfigType:
+    """The configuration from a command's values; it takes what it knows.
+
+    Raises:
+        ConfigError: If a value is out of range.
+    """
+    names = {field.name for field in dataclasses.fields(kind)}
+    return kind(**{name: value for name, value in values.items() if name in names})
+
+
+def attribute_helps(kind: type[Any]) -> dict[str, str]:
+    """The text of each attribute in the "Attributes:" of a class's docstring."""
+    text = inspect.cleandoc(kind.__doc__ or "").partition("Attributes:\n")[2]
+    found = re.findall(r"^ {4}(\w+): (.+(?:\n {8}.+)*)", text, re.MULTILINE)
+    return {name: " ".join(words.split()) for name, words in found}
+
+
+def _option(field: "dataclasses.Field[Any]", text: str) -> Callable[[Command], Command]:
+    flag = "--" + field.name.replace("_", "-")
+    if isinstance(field.default, bool):
+        return click.option(flag, is_flag=True, default=field.default, help=text)
+    return click.option(
+        flag,
+        type=_click_type(field.default),
+        default=field.default,
+        show_default=field.default is not None,
+        help=text,
+    )
+
+
+def _click_type(default: Any) -> Any:
+    if isinstance(default, enum.StrEnum):
+        return click.Choice(type(default))
+    if default is None:  # the only options without a value are files
+        return click.Path(path_type=Path)
+    return type(default)
