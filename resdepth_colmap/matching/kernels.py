@@ -110,7 +110,11 @@ def _random_gradient(w, x, y, K, state):
         cos = np.float32(0.25) + np.float32(0.75) * u
         sin = math.sqrt(np.float32(1.0) - cos * cos)
         phi = np.float32(2.0 * math.pi) * v
-        nx, ny, nz = np.float32(sin * math.cos(phi)), np.float32(sin * math.sin(phi)), -cos
+        nx, ny, nz = (
+            np.float32(sin * math.cos(phi)),
+            np.float32(sin * math.sin(phi)),
+            -cos,
+        )
         if -(nx * rx + ny * ry + nz) > np.float32(0.25):
             break
     if not _faces_camera(nx, ny, nz, x, y, K):

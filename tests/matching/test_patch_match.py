@@ -1,0 +1,129 @@
+"""Laws of the CPU PatchMatch, on an exact slanted plane seen by three cameras."""
+
+import numpy as np
+import pytest
+from numba import set_num_threads
+
+from resdepth_colmap.config import StereoConfig
+from resdepth_colmap.matching.patch_match import MatchResult, MatchView, match_view
+from resdepth_colmap.scene import FloatMap, Matrix
+
+WIDTH, HEIGHT, FOCAL = 80, 60, 70.0
+PLANE = np.array([0.2, -0.1, -1.0])  # n . xyz = -2.5 in the first camera's frame
+OFFSET = -2.5
+CONFIG = StereoConfig(num_iterations=4)
+NEAR_FAR = (1.2, 6.0)
+
+
+def intrinsics() -> Matrix:
+    return np.array([[FOCAL, 0, 39.5], [0, FOCAL, 29.5], [0, 0, 1.0]])
+
+
+def _texture(x: FloatMap, y: FloatMap) -> FloatMap:
+    waves = (
+        np.sin(9 * x + 2 * y) + np.sin(7 * y - 3 * x) + np.sin(17 * x) * np.sin(13 * y)
+    )
+    return (0.5 + 0.15 * waves).astype(np.float32)
+
+
+def _depth(cam_from_world: Matrix) -> Matrix:
+    """Exact depth of the plane, shape (H, W)."""
+    x, y = np.meshgrid(np.arange(WIDTH), np.arange(HEIGHT))
+    rays = np.stack([x, y, np.ones_like(x)], axis=-1) @ np.linalg.inv(intrinsics()).T
+    rotation, translation = cam_from_world[:, :3], cam_from_world[:, 3]
+    normal = rotation @ PLANE
+    return (OFFSET + normal @ translation) / (rays @ normal)
+
+
+def _view(x: float, y: float = 0.0, gain: float = 1.0, turn: float = 0.0) -> MatchView:
+    cos, sin = np.cos(turn), np.sin(turn)
+    rotation = np.array([[cos, 0, sin], [0, 1, 0], [-sin, 0, cos]])
+    pose = np.column_stack([rotation, -rotation @ np.array([x, y, 0.0])])
+    pixels = np.stack(np.meshgrid(np.arange(WIDTH), np.arange(HEIGHT)), axis=-1)
+    rays = np.concatenate([pixels, np.ones((HEIGHT, WIDTH, 1))], axis=-1)
+    xyz_in_cam = _depth(pose)[..., None] * (rays @ np.linalg.inv(intrinsics()).T)
+    xyz = (xyz_in_cam - pose[:, 3]) @ rotation
+    gray = gain * _texture(xyz[..., 0], xyz[..., 1])
+    return MatchView(gray=gray.astype(np.float32), K=intrinsics(), cam_from_world=pose)
+
+
+def _match(*sources: MatchView, **changes: int) -> MatchResult:
+    config = StereoConfig(**{**CONFIG.to_mapping(), **changes})
+    return match_view(_view(0.0), sources, NEAR_FAR, config)
+
+
+def _inner(values: FloatMap) -> FloatMap:
+    return values[8:-8, 16:-16]
+
+
+def test_an_exact_plane_is_found_to_a_per_mille() -> None:
+    result = _match(_view(0.25), _view(-0.2, 0.1))
+    truth = _depth(_view(0.0).cam_from_world)
+    error = _inner(np.abs(result.depth - truth) / truth)
+    assert np.median(error) < 1e-3
+    assert np.mean(error < 0.01) > 0.97
+
+
+def test_normals_are_those_of_the_plane_and_face_the_camera() -> None:
+    result = _match(_view(0.25), _view(-0.2, 0.1))
+    unit = PLANE / np.linalg.norm(PLANE)
+    cos = _inner(result.normals) @ unit
+    assert np.allclose(np.linalg.norm(result.normals, axis=-1), 1.0, atol=1e-5)
+    assert np.degrees(np.arccos(np.clip(np.median(cos), -1, 1))) < 3.0
+
+
+def test_a_turned_source_is_warped_with_its_whole_pose() -> None:
+    result = _match(_view(0.3, turn=0.08))
+    truth = _depth(_view(0.0).cam_from_world)
+    assert np.median(_inner(np.abs(result.depth - truth) / truth)) < 2e-3
+
+
+def test_the_same_seed_gives_the_same_maps_whatever_the_number_of_threads() -> None:
+    many = _match(_view(0.25))
+    set_num_threads(1)
+    try:
+        one = _match(_view(0.25))
+    finally:
+        set_num_threads(2)
+    assert np.array_equal(many.depth, one.depth)
+    assert np.array_equal(many.normals, one.normals)
+
+
+def test_another_seed_gives_other_maps() -> None:
+    first, second = _match(_view(0.25)), _match(_view(0.25), seed=1)
+    assert not np.array_equal(first.depth, second.depth)
+
+
+def test_another_exposure_of_the_source_changes_little() -> None:
+    truth = _depth(_view(0.0).cam_from_world)
+    result = _match(_view(0.25, gain=0.6))
+    assert np.median(_inner(np.abs(result.depth - truth) / truth)) < 2e-3
+
+
+def test_a_scene_without_texture_gives_depths_within_the_range() -> None:
+    flat = np.full((HEIGHT, WIDTH), 0.5, np.float32)
+    views = [
+        MatchView(gray=flat, K=view.K, cam_from_world=view.cam_from_world)
+        for view in (_view(0.0), _view(0.25))
+    ]
+    result = match_view(views[0], views[1:], NEAR_FAR, CONFIG)
+    assert np.all(np.isfinite(result.depth))
+    assert result.depth.min() >= NEAR_FAR[0] * 0.999
+    assert result.depth.max() <= NEAR_FAR[1] * 1.001
+
+
+def test_a_source_that_is_the_reference_gives_finite_maps() -> None:
+    result = _match(_view(0.0))
+    assert np.all(np.isfinite(result.depth))
+    assert np.all(np.isfinite(result.normals))
+
+
+@pytest.mark.parametrize("depth_range", [(0.0, 1.0), (2.0, 1.0), (-1.0, 1.0)])
+def test_an_empty_depth_range_is_refused(depth_range: tuple[float, float]) -> None:
+    with pytest.raises(ValueError, match="depth_range"):
+        match_view(_view(0.0), [_view(0.2)], depth_range, CONFIG)
+
+
+def test_a_view_without_sources_is_refused() -> None:
+    with pytest.raises(ValueError, match="sources"):
+        match_view(_view(0.0), [], NEAR_FAR, CONFIG)
