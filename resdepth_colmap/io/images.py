@@ -1,0 +1,135 @@
+"""Photos, read as grey or colour values, and PNG files written.
+
+PNG is never written through cv2: after `import pycolmap`, cv2 5.0 aborts the process.
+An EXIF orientation is not applied, because COLMAP's cameras do not apply it either.
+"""
+
+import contextlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+from PIL import Image, UnidentifiedImageError
+
+from resdepth_colmap.errors import WorkspaceError
+from resdepth_colmap.io.files import whole_file
+from resdepth_colmap.scene import ColorImage, GrayImage
+
+# Rec. 709, the weights of COLMAP's own conversion to grey.
+_LUMA = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
+
+
+def read_gray(path: Path) -> GrayImage:
+    """Read a photo as grey values.
+
+    Args:
+        path: Image file, 8 or 16 bits a channel, grey or colour; alpha is dropped.
+
+    Returns:
+        Grey values in 0..1, shape (H, W), float32.
+
+    Raises:
+        WorkspaceError: If the file is not there or no image.
+    """
+    values = _read_unit(path)
+    return values if values.ndim == 2 else values @ _LUMA
+
+
+def read_rgb(path: Path) -> ColorImage:
+    """Read a photo as RGB values, shape (H, W, 3), uint8; alpha is dropped.
+
+    Raises:
+        WorkspaceError: If the file is not there or no image.
+    """
+    values = _read_unit(path)
+    rounded = (values * 255 + 0.5).astype(np.uint8)
+    return rounded if rounded.ndim == 3 else np.repeat(rounded[..., np.newaxis], 3, 2)
+
+
+def image_size(path: Path) -> tuple[int, int]:
+    """Width and height of an image, in pixels, without decoding it.
+
+    Raises:
+        WorkspaceError: If the file is not there or no image.
+    """
+    with _open(path) as image:
+        return image.size
+
+
+def write_png(path: Path, rgb: ColorImage) -> None:
+    """Write a picture as PNG, whole or not at all; its folder is made.
+
+    Args:
+        path: The file to write.
+        rgb: RGB values, shape (H, W, 3), uint8.
+
+    Raises:
+        WorkspaceError: If the file cannot be written.
+    """
+    if rgb.ndim != 3 or rgb.shape[2] != 3 or rgb.dtype != np.uint8:
+        raise ValueError(f"{rgb.shape=}, {rgb.dtype=} but expected (H, W, 3), uint8.")
+    with whole_file(path) as partial:
+        Image.fromarray(rgb).save(partial, format="PNG")
+
+
+def _read_unit(path: Path) -> npt.NDArray[np.float32]:
+    """Values in 0..1, shape (H, W) or (H, W, 3), float32."""
+    with _open(path) as image:
+        if _is_16_bit_color(image):
+            return _read_16_bit_color(path)
+        if image.mode.startswith("I"):  # 16-bit grey
+            return _unit(np.asarray(image), 65535)
+        if image.mode == "F":
+            return _unit(np.nan_to_num(np.asarray(image)), 1)
+        is_gray = image.mode in ("1", "L", "LA")
+        return _unit(np.asarray(image.convert("L" if is_gray else "RGB")), 255)
+
+
+def _unit(values: npt.NDArray[Any], maximum: int) -> npt.NDArray[np.float32]:
+    scaled: npt.NDArray[np.float32] = values.astype(np.float32) / np.float32(maximum)
+    return np.clip(scaled, 0, 1)
+
+
+def _is_16_bit_color(image: Image.Image) -> bool:
+    # Pillow keeps 8 bits of each channel; its raw mode ("RGB;16B") tells of more.
+    tiles = getattr(image, "tile", [])
+    raw_modes = [tile[3] if isinstance(tile[3], str) else tile[3][0] for tile in tiles]
+    return any(str(raw).startswith("RGB") and ";16" in str(raw) for raw in raw_modes)
+
+
+def _read_16_bit_color(path: Path) -> npt.NDArray[np.float32]:
+    # Not cv2.imread, which cannot open non-ASCII paths on Windows.
+    data = np.fromfile(path, dtype=np.uint8)
+    values = cv2.imdecode(data, cv2.IMREAD_UNCHANGED)
+    if values is None or values.ndim != 3 or values.dtype != np.uint16:
+        raise WorkspaceError(f"{path}: cannot decode it as a 16-bit colour image.")
+    return _unit(values[..., 2::-1], 65535)  # BGR(A) to RGB
+
+
+@contextlib.contextmanager
+def _open(path: Path) -> Iterator[Image.Image]:
+    """An image of Pillow's whose errors name the file."""
+    try:
+        with _without_pixel_limit(), Image.open(path) as image:
+            yield image
+    except WorkspaceError:
+        raise
+    except UnidentifiedImageError as error:
+        raise WorkspaceError(f"{path}: not an image that can be read.") from error
+    except (OSError, SyntaxError, ValueError) as error:  # what Pillow's decoders raise
+        reason = getattr(error, "strerror", None) or error
+        raise WorkspaceError(f"{path}: cannot read the image ({reason}).") from error
+
+
+@contextlib.contextmanager
+def _without_pixel_limit() -> Iterator[None]:
+    # Aerial cameras have more pixels than Pillow's limit for images from the web.
+    limit = Image.MAX_IMAGE_PIXELS
+    Image.MAX_IMAGE_PIXELS = None
+    try:
+        yield
+    finally:
+        Image.MAX_IMAGE_PIXELS = limit

@@ -1,0 +1,182 @@
+"""COLMAP's sparse model, read into a Scene."""
+
+import contextlib
+import shlex
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pycolmap
+
+from resdepth_colmap.errors import WorkspaceError
+from resdepth_colmap.io.files import safe_name
+from resdepth_colmap.io.model_file import check_model_files
+from resdepth_colmap.scene import Camera, Matrix, Scene, View
+
+_PINHOLES = ("PINHOLE", "SIMPLE_PINHOLE")
+_ANGLE_PERCENTILE = 75.0  # COLMAP's choice for the sources of its PatchMatch
+
+# What pycolmap raises for a broken model (UnicodeDecodeError is a ValueError).
+_PYCOLMAP_ERRORS = (ValueError, IndexError, KeyError, RuntimeError, OSError)
+
+
+def read_scene(sparse_path: Path, images_path: Path, workspace_path: Path) -> Scene:
+    """Read cameras, poses, and what the sparse points say of the views.
+
+    Images without a pose are left out.
+
+    Args:
+        sparse_path: Folder of the model, binary or text, of any COLMAP version.
+        images_path: Folder of the undistorted images; they are not opened.
+        workspace_path: The dense workspace that both belong to.
+
+    Returns:
+        The scene; its statistics are None if there are no sparse points with tracks.
+
+    Raises:
+        WorkspaceError: If the model is missing, broken or empty, has a camera with
+            distortion, or names an image outside of its folder.
+    """
+    check_model_files(sparse_path)
+    with _quiet_pycolmap():
+        try:
+            model = pycolmap.Reconstruction(sparse_path)
+            images = [model.images[index] for index in sorted(model.reg_image_ids())]
+            names = [safe_name(image.name) for image in images]
+        except WorkspaceError as error:
+            raise WorkspaceError(f"{sparse_path}: {error}") from error
+        except _PYCOLMAP_ERRORS as error:
+            raise _broken(sparse_path, error) from error
+        _check_images(sparse_path, names)
+        _check_cameras(sparse_path, images_path, images)
+        views = tuple(_view(sparse_path, image) for image in images)
+        num_points = model.num_points3D()
+        if num_points == 0:
+            return Scene(views=views)
+        try:
+            mvs_model = pycolmap.MVSModel()
+            mvs_model.read_from_colmap(
+                workspace_path.absolute(),
+                sparse_path.absolute(),
+                images_path.absolute(),
+            )
+            return _scene_with_points(views, num_points, mvs_model)
+        except _PYCOLMAP_ERRORS as error:
+            raise _broken(sparse_path, error) from error
+
+
+def _scene_with_points(
+    views: tuple[View, ...], num_points: int, mvs_model: Any
+) -> Scene:
+    depth_range = np.array(mvs_model.compute_depth_ranges(), dtype=np.float64)
+    has_points = depth_range[:, 1] > 0  # COLMAP says (-1, -1) where there are none
+    if not has_points.any():  # points without tracks say nothing of the views
+        return Scene(views=views, num_points=num_points)
+    order = _order(views, mvs_model)
+    shared = _square(mvs_model.compute_shared_points())
+    angles = _square(mvs_model.compute_triangulation_angles(_ANGLE_PERCENTILE))
+    depth_range[~has_points] = 0
+    return Scene(
+        views=views,
+        num_points=num_points,
+        num_shared_points=shared[np.ix_(order, order)].astype(np.int64),
+        triangulation_angle_deg=np.degrees(angles[np.ix_(order, order)]),
+        depth_range=depth_range[order],
+    )
+
+
+def _order(views: tuple[View, ...], mvs_model: Any) -> list[int]:
+    """Where each view stands in the MVSModel: the same place, but do not rely on it."""
+    order = {mvs_model.get_image_name(index): index for index in range(len(views))}
+    return [order[view.name] for view in views]
+
+
+def _square(rows: list[dict[int, float]]) -> Matrix:
+    """A symmetric matrix of what COLMAP says of each pair of images; 0 elsewhere."""
+    matrix = np.zeros((len(rows), len(rows)), dtype=np.float64)
+    for row, values in enumerate(rows):
+        for column, value in values.items():
+            matrix[row, column] = value
+    return matrix
+
+
+def _view(sparse_path: Path, image: Any) -> View:
+    camera = image.camera
+    K = camera.calibration_matrix()
+    pose = np.array(image.cam_from_world().matrix(), dtype=np.float64)
+    rotation = pose[:, :3]
+    is_rotation = np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-3)
+    if not (is_rotation and np.isfinite(pose).all() and _is_camera(camera, K)):
+        raise WorkspaceError(
+            f"{sparse_path}: the pose or camera {image.camera_id} of {image.name} is "
+            "not one (not finite, no rotation or no positive size); "
+            "run the reconstruction again."
+        )
+    return View(
+        image_id=int(image.image_id),
+        name=image.name,
+        camera=Camera(
+            width_px=int(camera.width),
+            height_px=int(camera.height),
+            fx=float(K[0, 0]),
+            fy=float(K[1, 1]),
+            cx=float(K[0, 2]),
+            cy=float(K[1, 2]),
+        ),
+        cam_from_world=pose,
+    )
+
+
+def _is_camera(camera: Any, K: Matrix) -> bool:
+    sizes = (camera.width, camera.height, K[0, 0], K[1, 1])
+    return bool(np.isfinite(K).all()) and min(sizes) > 0
+
+
+def _check_images(sparse_path: Path, names: list[str]) -> None:
+    if not names:
+        raise WorkspaceError(
+            f"{sparse_path}: the model is empty (no image with a pose); "
+            "point at a workspace whose reconstruction succeeded."
+        )
+    repeated = sorted(name for name, count in Counter(names).items() if count > 1)
+    if repeated:
+        raise WorkspaceError(
+            f"{sparse_path}: the model names {repeated[0]} more than once; "
+            "image names have to be unique, as the maps are named after them."
+        )
+
+
+def _check_cameras(sparse_path: Path, images_path: Path, images: list[Any]) -> None:
+    for image in images:
+        model_name = image.camera.model_name
+        if model_name not in _PINHOLES:
+            input_path, image_path = map(
+                shlex.quote, map(str, (sparse_path, images_path))
+            )
+            raise WorkspaceError(
+                f"{sparse_path}: camera {image.camera_id} is of model {model_name}, "
+                "but only undistorted images can be used (PINHOLE, SIMPLE_PINHOLE); "
+                f"run `colmap image_undistorter --image_path {image_path} --input_path "
+                f"{input_path} --output_path DENSE` and point at DENSE."
+            )
+
+
+def _broken(sparse_path: Path, error: Exception) -> WorkspaceError:
+    reason = " ".join(str(error).split())[:200]
+    return WorkspaceError(
+        f"{sparse_path}: the model cannot be read ({reason}); "
+        "copy it again or export it again with `colmap model_converter`."
+    )
+
+
+@contextlib.contextmanager
+def _quiet_pycolmap() -> Iterator[None]:
+    """Keep COLMAP's log off stderr: what matters is raised."""
+    level = pycolmap.logging.minloglevel
+    pycolmap.logging.minloglevel = int(pycolmap.logging.FATAL)
+    try:
+        yield
+    finally:
+        pycolmap.logging.minloglevel = level

@@ -1,0 +1,87 @@
+"""COLMAP's binary model files, checked for wholeness before pycolmap reads them.
+
+pycolmap 4.2.1 never returns from a truncated `points3D.bin`, and takes what is missing
+of `cameras.bin` and `images.bin` from uninitialised memory. So each record is walked.
+"""
+
+import struct
+from collections.abc import Callable
+from pathlib import Path
+
+from resdepth_colmap.errors import WorkspaceError
+
+MODEL_PARTS = ("cameras", "images", "points3D", "rigs", "frames")
+"""The files of a model, each as .bin or .txt; the last two are of COLMAP 3.12 on."""
+
+# Number of parameters of COLMAP's camera models, by model id.
+_NUM_PARAMETERS = (3, 4, 4, 5, 8, 8, 12, 5, 4, 5, 12, 16, 4, 5, 3, 4, 6, 2)
+
+
+def find_model(folder: Path) -> str | None:
+    """The kind of model in a folder: ".bin", ".txt" or None; binary goes first."""
+    for suffix in (".bin", ".txt"):
+        if (folder / f"cameras{suffix}").is_file():
+            return suffix
+    return None
+
+
+def check_model_files(folder: Path) -> None:
+    """Check that the files of a model are all there, and whole if they are binary.
+
+    Raises:
+        WorkspaceError: If the folder holds no model, or a file is missing or truncated.
+    """
+    suffix = find_model(folder)
+    if suffix is None:
+        raise WorkspaceError(
+            f"{folder}: no COLMAP model (no cameras.bin, cameras.txt)."
+        )
+    for part in MODEL_PARTS[:3]:
+        if not (folder / f"{part}{suffix}").is_file():
+            raise WorkspaceError(
+                f"{folder / part}{suffix}: no such file, but a model has cameras, "
+                "images and points3D; export the model again."
+            )
+    if suffix == ".bin":
+        for part, step in _STEPS.items():
+            _walk(folder / f"{part}.bin", step)
+
+
+def _walk(path: Path, step: Callable[[bytes, int], int]) -> None:
+    try:
+        data = path.read_bytes()
+        (num_records,) = struct.unpack_from("<Q", data)
+        offset = 8
+        for _ in range(num_records):
+            offset = step(data, offset)
+            if offset > len(data):
+                break
+    except (OSError, struct.error, ValueError, IndexError) as error:
+        raise _broken(path) from error
+    if offset > len(data):
+        raise _broken(path)
+
+
+def _after_camera(data: bytes, offset: int) -> int:
+    _, model_id = struct.unpack_from("<II", data, offset)
+    return offset + 24 + 8 * _NUM_PARAMETERS[model_id]
+
+
+def _after_image(data: bytes, offset: int) -> int:
+    end_of_name = data.index(b"\0", offset + 64)  # id, pose and camera id come before
+    (num_points2d,) = struct.unpack_from("<Q", data, end_of_name + 1)
+    return end_of_name + 9 + 24 * int(num_points2d)
+
+
+def _after_point(data: bytes, offset: int) -> int:
+    (track_length,) = struct.unpack_from("<Q", data, offset + 43)
+    return offset + 51 + 8 * int(track_length)
+
+
+_STEPS = {"cameras": _after_camera, "images": _after_image, "points3D": _after_point}
+
+
+def _broken(path: Path) -> WorkspaceError:
+    return WorkspaceError(
+        f"{path}: truncated or no COLMAP model file; copy it or export the model again."
+    )
