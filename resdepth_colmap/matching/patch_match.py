@@ -72,7 +72,7 @@ def match_view(
         raise ValueError("a reference view without sources cannot be matched.")
     if not 0 < near < far:
         raise ValueError(f"{depth_range=} but expected 0 < near < far.")
-    from resdepth_colmap.matching import kernels  # numba: slow import
+    from resdepth_colmap.matching import sweeps  # numba: slow import
 
     height, width = reference.gray.shape
     planes = np.zeros((height, width, 3), np.float32)
@@ -90,14 +90,14 @@ def match_view(
         np.float32(config.sigma_color),
         config.seed,
     )
-    kernels.start(*arguments)
+    sweeps.start(*arguments)
     for number in range(1, config.num_iterations + 1):
         for color in (0, 1):
-            kernels.sweep(*arguments, number, color)
+            sweeps.sweep(*arguments, number, color)
         if on_sweep:
             on_sweep(number, config.num_iterations)
     normals = np.zeros((height, width, 3), np.float32)
-    kernels.normals_of(planes, K, normals)
+    sweeps.normals_of(planes, K, normals)
     return MatchResult(depth=1.0 / planes[..., 0], normals=normals, cost=costs)
 
 
