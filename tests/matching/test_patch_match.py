@@ -1,12 +1,16 @@
 """Laws of the CPU PatchMatch, on an exact slanted plane seen by three cameras."""
 
+from typing import Any
+
 import numpy as np
 import pytest
-from numba import set_num_threads
+from numba import get_num_threads, set_num_threads
+from numpy.typing import NDArray
 
 from resdepth_colmap.config import StereoConfig
 from resdepth_colmap.matching.patch_match import MatchResult, MatchView, match_view
-from resdepth_colmap.scene import FloatMap, Matrix
+
+Array = NDArray[Any]
 
 WIDTH, HEIGHT, FOCAL = 80, 60, 70.0
 PLANE = np.array([0.2, -0.1, -1.0])  # n . xyz = -2.5 in the first camera's frame
@@ -15,24 +19,24 @@ CONFIG = StereoConfig(num_iterations=4)
 NEAR_FAR = (1.2, 6.0)
 
 
-def intrinsics() -> Matrix:
+def intrinsics() -> Array:
     return np.array([[FOCAL, 0, 39.5], [0, FOCAL, 29.5], [0, 0, 1.0]])
 
 
-def _texture(x: FloatMap, y: FloatMap) -> FloatMap:
+def _texture(x: Array, y: Array) -> Array:
     waves = (
         np.sin(9 * x + 2 * y) + np.sin(7 * y - 3 * x) + np.sin(17 * x) * np.sin(13 * y)
     )
-    return (0.5 + 0.15 * waves).astype(np.float32)
+    return np.asarray(0.5 + 0.15 * waves, np.float32)
 
 
-def _depth(cam_from_world: Matrix) -> Matrix:
+def _depth(cam_from_world: Array) -> Array:
     """Exact depth of the plane, shape (H, W)."""
     x, y = np.meshgrid(np.arange(WIDTH), np.arange(HEIGHT))
     rays = np.stack([x, y, np.ones_like(x)], axis=-1) @ np.linalg.inv(intrinsics()).T
     rotation, translation = cam_from_world[:, :3], cam_from_world[:, 3]
     normal = rotation @ PLANE
-    return (OFFSET + normal @ translation) / (rays @ normal)
+    return np.asarray((OFFSET + normal @ translation) / (rays @ normal))
 
 
 def _view(x: float, y: float = 0.0, gain: float = 1.0, turn: float = 0.0) -> MatchView:
@@ -52,7 +56,7 @@ def _match(*sources: MatchView, **changes: int) -> MatchResult:
     return match_view(_view(0.0), sources, NEAR_FAR, config)
 
 
-def _inner(values: FloatMap) -> FloatMap:
+def _inner(values: Array) -> Array:
     return values[8:-8, 16:-16]
 
 
@@ -79,12 +83,13 @@ def test_a_turned_source_is_warped_with_its_whole_pose() -> None:
 
 
 def test_the_same_seed_gives_the_same_maps_whatever_the_number_of_threads() -> None:
+    num_threads = get_num_threads()
     many = _match(_view(0.25))
     set_num_threads(1)
     try:
         one = _match(_view(0.25))
     finally:
-        set_num_threads(2)
+        set_num_threads(num_threads)
     assert np.array_equal(many.depth, one.depth)
     assert np.array_equal(many.normals, one.normals)
 
