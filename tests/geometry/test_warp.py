@@ -10,13 +10,14 @@ from resdepth_colmap.geometry.warp import warp_to_reference
 
 
 def warp(pair: Pair) -> tuple[Tensor, Tensor]:
-    return warp_to_reference(
+    warped, inside = warp_to_reference(
         pair.source_gray,
         inverse_depth(pair.depth),
         pair.reference_K,
         pair.source_K,
         pair.source_from_reference,
     )
+    return warped, inside
 
 
 def error(pair: Pair, warped: Tensor, inside: Tensor) -> Tensor:
