@@ -1,0 +1,55 @@
+"""Render rooms and match them: the data that the shipped weights were trained on.
+
+    python scripts/make_training_data.py rooms --num-scenes 300 --workers 2
+
+Two views in most rooms, three or four in some, so that the network sees maps from one
+source and from several. Goes on where it stopped.
+"""
+
+import argparse
+import multiprocessing
+import os
+from functools import partial
+from pathlib import Path
+
+VIEW_COUNTS = (2, 2, 2, 3, 2, 2, 4)
+
+
+def make_room(output: Path, seed: int) -> str:
+    """Render one room, and match all of its views."""
+    from resdepth_colmap.config import StereoBackend, StereoConfig, SynthesisConfig
+    from resdepth_colmap.io.model import read_scene
+    from resdepth_colmap.io.workspace import open_workspace
+    from resdepth_colmap.pipeline.stereo import stereo_workspace
+    from resdepth_colmap.training.synthesize import synthesize
+
+    num_views = VIEW_COUNTS[seed % len(VIEW_COUNTS)]
+    (path,) = synthesize(output, SynthesisConfig(num_views=num_views, seed=seed))
+    workspace = open_workspace(path)
+    scene = read_scene(workspace.sparse_path, workspace.images_path, workspace.path)
+    report = stereo_workspace(
+        workspace, scene, StereoConfig(seed=seed), StereoBackend.CPU
+    )
+    return f"{path.name}: {len(report.matched)} matched, {len(report.kept)} kept"
+
+
+def main() -> None:
+    """Read the command line and keep the workers busy."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("output", type=Path)
+    parser.add_argument("--num-scenes", type=int, default=300)
+    parser.add_argument("--first-seed", type=int, default=0)
+    parser.add_argument("--workers", type=int, default=2)
+    arguments = parser.parse_args()
+    os.environ["NUMBA_NUM_THREADS"] = "1"
+    os.environ["OMP_NUM_THREADS"] = "1"
+    seeds = range(arguments.first_seed, arguments.first_seed + arguments.num_scenes)
+    context = multiprocessing.get_context("spawn")
+    with context.Pool(arguments.workers) as pool:
+        make = partial(make_room, arguments.output)
+        for line in pool.imap_unordered(make, seeds):
+            print(line, flush=True)
+
+
+if __name__ == "__main__":
+    main()
