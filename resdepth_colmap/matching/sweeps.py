@@ -2,6 +2,7 @@
 
 import math
 
+import numba
 import numpy as np
 from numba import njit, prange
 
@@ -15,6 +16,9 @@ from resdepth_colmap.matching.planes import (
     random_gradient,
     seeded_state,
 )
+
+# Without this numba tries TBB first, and warns where it finds an old one.
+numba.config.THREADING_LAYER_PRIORITY = ["omp", "tbb", "workqueue"]
 
 NUM_STATES = 9  # eight neighbours and the plane that the pixel has
 NUM_TRIALS = 6  # random and perturbed planes

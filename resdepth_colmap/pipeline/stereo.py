@@ -1,0 +1,313 @@
+"""Stage "stereo": initial depth and normal maps for the views that have none."""
+
+import dataclasses
+import hashlib
+import json
+import logging
+from collections.abc import Iterable
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from resdepth_colmap.config import StereoBackend, StereoConfig
+from resdepth_colmap.errors import BackendUnavailableError, WorkspaceError
+from resdepth_colmap.geometry.depth_range import depth_range
+from resdepth_colmap.geometry.pixels import index_K
+from resdepth_colmap.geometry.view_selection import choose_sources
+from resdepth_colmap.io.depth_map import write_depth_map
+from resdepth_colmap.io.images import read_gray
+from resdepth_colmap.io.normal_map import write_normal_map
+from resdepth_colmap.io.output import read_record, write_record
+from resdepth_colmap.io.patch_match_cfg import SourceKind, SourceSpec, read_sources
+from resdepth_colmap.io.workspace import Workspace
+from resdepth_colmap.matching.patch_match import MatchResult, MatchView, match_view
+from resdepth_colmap.pipeline.progress import Advance, Progress, SilentProgress
+from resdepth_colmap.scene import Scene, View
+
+logger = logging.getLogger(__name__)
+
+KIND = "photometric"
+LEDGER_NAME = "resdepth-stereo.json"
+AUTO_SOURCES = 20  # COLMAP's default in patch-match.cfg
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class StereoReport:
+    """What the stage did.
+
+    Attributes:
+        backend: Who matched.
+        matched: Names of the views matched now.
+        kept: Names of the views whose maps were there already.
+        skipped: Name and reason of each view that could not be matched.
+    """
+
+    backend: StereoBackend
+    matched: tuple[str, ...] = ()
+    kept: tuple[str, ...] = ()
+    skipped: tuple[tuple[str, str], ...] = ()
+
+
+def choose_backend(
+    requested: StereoBackend, workspace: Workspace, scene: Scene
+) -> StereoBackend:
+    """Turn `auto` into what this machine and this workspace allow.
+
+    Maps that are there win; then COLMAP's own PatchMatch, where pycolmap was built
+    with CUDA; then ours on the CPU.
+
+    Raises:
+        WorkspaceError: If existing maps were asked for and there are none.
+        BackendUnavailableError: If COLMAP's was asked for and pycolmap has no CUDA.
+    """
+    has_maps = any(workspace.map_kinds(view.name) for view in scene.views)
+    has_cuda = False
+    if requested is StereoBackend.COLMAP or (
+        requested is StereoBackend.AUTO and not has_maps
+    ):
+        import pycolmap
+
+        has_cuda = bool(pycolmap.has_cuda)
+    if requested is StereoBackend.EXISTING and not has_maps:
+        raise WorkspaceError(
+            f"{workspace.stereo_path / 'depth_maps'}: no depth map for any image of "
+            "the model; make some with --stereo cpu."
+        )
+    if requested is StereoBackend.COLMAP and not has_cuda:
+        raise BackendUnavailableError(
+            "COLMAP's PatchMatch needs CUDA, and this pycolmap has none; use "
+            "--stereo cpu, or install pycolmap-cuda12 on a machine with an NVIDIA GPU."
+        )
+    if requested is not StereoBackend.AUTO:
+        return requested
+    if has_maps:
+        return StereoBackend.EXISTING
+    return StereoBackend.COLMAP if has_cuda else StereoBackend.CPU
+
+
+def stereo_workspace(
+    workspace: Workspace,
+    scene: Scene,
+    config: StereoConfig,
+    backend: StereoBackend = StereoBackend.AUTO,
+    *,
+    overwrite: bool = False,
+    progress: Progress | None = None,
+) -> StereoReport:
+    """Make the photometric depth and normal maps that a workspace lacks.
+
+    Maps of others are never replaced unless `overwrite` says so; our own are made anew
+    when an option or an input changed.
+
+    Raises:
+        WorkspaceError: If an image cannot be read, or nothing could be matched.
+        BackendUnavailableError: See `choose_backend`.
+    """
+    backend = choose_backend(backend, workspace, scene)
+    if backend is StereoBackend.EXISTING:
+        names = [v.name for v in scene.views if workspace.map_kinds(v.name)]
+        return StereoReport(backend=backend, kept=tuple(names))
+    if backend is StereoBackend.COLMAP:
+        return _run_colmap(workspace, scene, config)
+    return _run_cpu(workspace, scene, config, overwrite, progress or SilentProgress())
+
+
+def _run_colmap(
+    workspace: Workspace, scene: Scene, config: StereoConfig
+) -> StereoReport:
+    import pycolmap
+
+    options = pycolmap.PatchMatchOptions()
+    options.max_image_size = config.max_image_size
+    options.window_radius = config.window_radius
+    options.sigma_color = config.sigma_color
+    options.depth_min = config.depth_min
+    options.depth_max = config.depth_max
+    pycolmap.patch_match_stereo(str(workspace.path), options=options)
+    names = tuple(view.name for view in scene.views)
+    return StereoReport(backend=StereoBackend.COLMAP, matched=names)
+
+
+def _run_cpu(
+    workspace: Workspace,
+    scene: Scene,
+    config: StereoConfig,
+    overwrite: bool,
+    progress: Progress,
+) -> StereoReport:
+    plans, skipped = plan_sources(workspace, scene, config)
+    ledger = _Ledger(workspace)
+    todo, kept = [], []
+    for index, sources in plans.items():
+        view = scene.views[index]
+        fingerprint = _fingerprint(workspace, scene, index, sources, config)
+        if not overwrite and ledger.is_kept(view.name, fingerprint):
+            kept.append(view.name)
+        else:
+            todo.append((index, sources, fingerprint))
+    if todo:
+        logger.info("Compiling the matcher: up to a minute, once on a machine.")
+    matched = []
+    images = _ImageCache(workspace, config.max_image_size)
+    with progress.stage("PatchMatch", len(todo)) as advance:
+        for index, sources, fingerprint in todo:
+            view = scene.views[index]
+            result = _match(scene, index, sources, config, images, advance)
+            write_depth_map(workspace.depth_map_path(view.name, KIND), result.depth)
+            write_normal_map(workspace.normal_map_path(view.name, KIND), result.normals)
+            ledger.add(view.name, fingerprint)
+            matched.append(view.name)
+    if not matched and not kept:
+        raise WorkspaceError(
+            f"{workspace.path}: no view could be matched: "
+            + "; ".join(f"{name}: {reason}" for name, reason in skipped[:3])
+        )
+    return StereoReport(
+        backend=StereoBackend.CPU,
+        matched=tuple(matched),
+        kept=tuple(kept),
+        skipped=tuple(skipped),
+    )
+
+
+def plan_sources(
+    workspace: Workspace, scene: Scene, config: StereoConfig
+) -> tuple[dict[int, tuple[int, ...]], list[tuple[str, str]]]:
+    """Which views each reference view is matched against, as patch-match.cfg says.
+
+    Without that file every view is matched against automatically chosen ones.
+
+    Returns:
+        Indices of the sources by index of the reference; and name and reason of each
+        view that cannot be matched.
+    """
+    path = workspace.stereo_path / "patch-match.cfg"
+    specs = read_sources(path) if path.exists() else _automatic(scene)
+    plans: dict[int, tuple[int, ...]] = {}
+    skipped = []
+    for name, spec in specs.items():
+        index = scene.index(name)
+        if index < 0:
+            skipped.append((name, f"{path.name} names it, but the model does not"))
+            continue
+        sources = _sources_of(scene, index, spec, config)
+        if sources:
+            plans[index] = sources
+        else:
+            skipped.append((name, "no other view overlaps with it"))
+    for name, reason in skipped:
+        logger.warning("%s is skipped: %s.", name, reason)
+    return plans, skipped
+
+
+def _automatic(scene: Scene) -> dict[str, SourceSpec]:
+    return {
+        view.name: SourceSpec(kind=SourceKind.AUTO, num_auto=AUTO_SOURCES)
+        for view in scene.views
+    }
+
+
+def _sources_of(
+    scene: Scene, index: int, spec: SourceSpec, config: StereoConfig
+) -> tuple[int, ...]:
+    limit = config.max_num_sources
+    if spec.kind is SourceKind.EXPLICIT:
+        named = (scene.index(name) for name in spec.names)
+        return tuple(other for other in named if other not in (-1, index))[:limit]
+    if spec.kind is SourceKind.AUTO:
+        limit = min(limit, spec.num_auto)
+    return tuple(choice.index for choice in choose_sources(scene, index, limit))
+
+
+def _match(
+    scene: Scene,
+    index: int,
+    sources: tuple[int, ...],
+    config: StereoConfig,
+    images: "_ImageCache",
+    advance: Advance,
+) -> MatchResult:
+    near, far = config.depth_min, config.depth_max
+    if near <= 0:
+        near, far = depth_range(scene, index, sources)
+    return match_view(
+        images.match_view(scene.views[index]),
+        [images.match_view(scene.views[source]) for source in sources],
+        (near, far),
+        config,
+        on_sweep=lambda _, total: advance(1.0 / total),
+    )
+
+
+class _ImageCache:
+    """Grey images at matching size, the last few of them."""
+
+    def __init__(self, workspace: Workspace, max_image_size: int) -> None:
+        self.workspace = workspace
+        self.max_image_size = max_image_size
+        self.views: dict[str, MatchView] = {}
+
+    def match_view(self, view: View) -> MatchView:
+        if view.name not in self.views:
+            if len(self.views) >= 2 * 16:
+                del self.views[next(iter(self.views))]
+            self.views[view.name] = self._load(view)
+        return self.views[view.name]
+
+    def _load(self, view: View) -> MatchView:
+        gray = read_gray(self.workspace.image_path(view.name))
+        height, width = gray.shape
+        scale = min(1.0, self.max_image_size / max(height, width))
+        if 0 < scale < 1.0:
+            size = (max(1, round(width * scale)), max(1, round(height * scale)))
+            gray = cv2.resize(gray, size, interpolation=cv2.INTER_AREA)
+        camera = view.camera.resized(gray.shape[1], gray.shape[0])
+        return MatchView(
+            gray=np.ascontiguousarray(gray, np.float32),
+            K=index_K(camera),
+            cam_from_world=view.cam_from_world,
+        )
+
+
+class _Ledger:
+    """Which maps are ours, and from what they were made."""
+
+    def __init__(self, workspace: Workspace) -> None:
+        self.workspace = workspace
+        self.path = workspace.stereo_path / LEDGER_NAME
+        self.fingerprints = read_record(self.path) if self.path.exists() else {}
+
+    def is_kept(self, name: str, fingerprint: str) -> bool:
+        """Whether both maps are there, and are others' or ours from the same input."""
+        paths: Iterable[Path] = (
+            self.workspace.depth_map_path(name, KIND),
+            self.workspace.normal_map_path(name, KIND),
+        )
+        depth_path, normal_path = paths
+        if name not in self.fingerprints:
+            return depth_path.exists()
+        there = depth_path.exists() and normal_path.exists()
+        return there and self.fingerprints[name] == fingerprint
+
+    def add(self, name: str, fingerprint: str) -> None:
+        self.fingerprints[name] = fingerprint
+        write_record(self.path, self.fingerprints)
+
+
+def _fingerprint(
+    workspace: Workspace,
+    scene: Scene,
+    index: int,
+    sources: tuple[int, ...],
+    config: StereoConfig,
+) -> str:
+    """A hash of all that the maps of a view are made from."""
+    digest = hashlib.sha256(json.dumps(config.to_mapping(), sort_keys=True).encode())
+    for other in (index, *sources):
+        view = scene.views[other]
+        status = workspace.image_path(view.name).stat()
+        digest.update(f"{view.name} {status.st_size} {status.st_mtime_ns}".encode())
+        digest.update(view.cam_from_world.tobytes())
+        digest.update(repr(view.camera).encode())
+    return digest.hexdigest()
