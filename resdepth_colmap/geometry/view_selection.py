@@ -80,7 +80,8 @@ def _standing_apart(scene: Scene, reference: int, others: Sequence[int]) -> list
     view = scene.views[reference]
     distances = {i: baseline(view, scene.views[i]) for i in others if i != reference}
     typical = float(np.median([baseline(view, other) for other in scene.views]))
-    rounding = 1e-9 * max(np.linalg.norm(it.center_in_world) for it in scene.views)
+    centers = np.array([it.center_in_world for it in scene.views])
+    rounding = 1e-9 * float(np.abs(centers).max())
     least = max(LEAST_BASELINE_RATIO * typical, rounding)
     return [index for index, distance in distances.items() if distance > least]
 
