@@ -23,8 +23,13 @@ def make_room(output: Path, seed: int) -> str:
     from resdepth_colmap.pipeline.stereo import stereo_workspace
     from resdepth_colmap.training.synthesize import synthesize
 
-    num_views = VIEW_COUNTS[seed % len(VIEW_COUNTS)]
-    (path,) = synthesize(output, SynthesisConfig(num_views=num_views, seed=seed))
+    config = SynthesisConfig(
+        num_views=VIEW_COUNTS[seed % len(VIEW_COUNTS)],
+        width_px=544,  # a crop of 512 x 384 and some play
+        height_px=416,
+        seed=seed,
+    )
+    (path,) = synthesize(output, config)
     workspace = open_workspace(path)
     scene = read_scene(workspace.sparse_path, workspace.images_path, workspace.path)
     report = stereo_workspace(

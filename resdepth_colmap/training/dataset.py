@@ -1,0 +1,313 @@
+"""Training crops from workspaces with ground truth.
+
+What does not depend on the crop (warping, filling, correlation) is done once for each
+view and kept in a cache folder: the network's inputs are then only read and cut.
+"""
+
+import dataclasses
+import hashlib
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from resdepth_colmap.config import NetworkConfig
+from resdepth_colmap.errors import TrainingError
+from resdepth_colmap.geometry.pixels import index_K
+from resdepth_colmap.geometry.view_selection import choose_sources
+from resdepth_colmap.io.depth_map import read_depth_map
+from resdepth_colmap.io.files import write_whole
+from resdepth_colmap.io.images import read_gray
+from resdepth_colmap.io.model import read_scene
+from resdepth_colmap.io.workspace import Workspace, open_workspace
+from resdepth_colmap.pipeline.inputs import (
+    InputStack,
+    SourceTensors,
+    ViewTensors,
+    build_inputs,
+    initial_tensors,
+    network_input,
+)
+from resdepth_colmap.pipeline.progress import Progress, SilentProgress
+from resdepth_colmap.scene import DepthMap, Scene, View, cam_from_cam
+
+HOLES_CONSISTENCY = 0.25
+"""Photo-consistency above which the copy "with holes" of a map has none."""
+
+NEAR_TRUTH_WEIGHT = (0.3, 3.0)
+"""Range of the weight that turns errors of inverse depth into relative ones."""
+
+
+class Sample(NamedTuple):
+    """One view with its initial and its true inverse depth, ready to be cut.
+
+    Attributes:
+        inverse_depth: Initial, holes filled, shape (H, W), float32, 1/unit.
+        target: True inverse depth, shape (H, W), float32, 1/unit; 0 = unknown.
+        valid: Where the initial depth was real, shape (H, W), bool.
+        guidance: The other channels, shape (C, H, W), float16.
+        baseline: Distance to the first source, shape (1,), float32, units.
+    """
+
+    inverse_depth: NDArray[np.float32]
+    target: NDArray[np.float32]
+    valid: NDArray[np.bool_]
+    guidance: NDArray[np.float16]
+    baseline: NDArray[np.float32]
+
+
+class Batch(NamedTuple):
+    """What one optimiser step sees.
+
+    Attributes:
+        inputs: The network's input, shape (B, C, H, W).
+        target: True inverse depth, normalised as the input is, shape (B, 1, H, W).
+        known: Where there is truth, shape (B, 1, H, W), bool.
+        weight: Weight of each pixel, shape (B, 1, H, W).
+        names: The samples' names, for the message when a loss is not a number.
+    """
+
+    inputs: Tensor
+    target: Tensor
+    known: Tensor
+    weight: Tensor
+    names: tuple[str, ...]
+
+
+def prepare_samples(
+    workspaces: Sequence[Path],
+    config: NetworkConfig,
+    cache: Path,
+    progress: Progress | None = None,
+) -> list[Path]:
+    """Build the samples of all views that have a depth map and a ground truth.
+
+    Each view gives two: its map as it is, and with holes where the photographs
+    contradict it, as a filter would leave it.
+
+    Args:
+        workspaces: Dense workspaces with `ground_truth/<image>.bin`.
+        config: The network that will be trained.
+        cache: Folder of the samples; those that are there are kept.
+        progress: Is told of each workspace.
+
+    Returns:
+        Paths of all samples, in the order of the workspaces.
+
+    Raises:
+        TrainingError: If no view has both.
+    """
+    progress = progress or SilentProgress()
+    key = json.dumps(config.to_mapping(), sort_keys=True)
+    folder = cache / hashlib.sha256(key.encode()).hexdigest()[:12]
+    paths: list[Path] = []
+    with progress.stage("Preparing samples", len(workspaces)) as advance:
+        for path in workspaces:
+            paths += _prepare_workspace(open_workspace(path), config, folder)
+            advance(1.0)
+    if not paths:
+        raise TrainingError(
+            f"{workspaces[0].parent}: no view has a depth map in stereo/depth_maps and "
+            "a ground_truth/<image>.bin; run `resdepth-colmap stereo` on each."
+        )
+    return paths
+
+
+def _prepare_workspace(
+    workspace: Workspace, config: NetworkConfig, folder: Path
+) -> list[Path]:
+    scene = read_scene(workspace.sparse_path, workspace.images_path, workspace.path)
+    paths = []
+    for index, view in enumerate(scene.views):
+        truth_path = workspace.path / "ground_truth" / f"{view.name}.bin"
+        kinds = workspace.map_kinds(view.name)
+        if not kinds or not truth_path.exists():
+            continue
+        stem = f"{workspace.path.name}-{view.name.replace('/', '-')}"
+        targets = [folder / f"{stem}-{kind}.npz" for kind in ("dense", "holes")]
+        if not all(target.exists() for target in targets):
+            depth = read_depth_map(workspace.depth_map_path(view.name, kinds[0]))
+            truth = read_depth_map(truth_path)
+            for target in targets:
+                sample = build_sample(workspace, scene, index, depth, truth, config)
+                _write_sample(target, sample)
+                depth = _with_holes(depth, sample, config)
+        paths += targets
+    return paths
+
+
+def build_sample(
+    workspace: Workspace,
+    scene: Scene,
+    index: int,
+    depth: DepthMap,
+    truth: DepthMap,
+    config: NetworkConfig,
+) -> Sample:
+    """The sample of one view, from its initial and its true depth."""
+    view = scene.views[index]
+    inverse_depth, valid = initial_tensors(depth)
+    choices = choose_sources(scene, index, config.num_sources)
+    sources = tuple(
+        _source_tensors(workspace, view, scene.views[choice.index])
+        for choice in choices
+    )
+    tensors = ViewTensors(
+        inverse_depth=inverse_depth,
+        valid=valid,
+        gray=_gray_tensor(workspace, view),
+        K=torch.from_numpy(index_K(view.camera))[None],
+        sources=sources,
+    )
+    stack = build_inputs(tensors, config)
+    known = truth > 0
+    target = np.where(known, 1.0 / np.where(known, truth, 1.0), 0.0)
+    return Sample(
+        inverse_depth=stack.inverse_depth[0, 0].numpy(),
+        target=target.astype(np.float32),
+        valid=stack.valid[0, 0].numpy(),
+        guidance=stack.guidance[0].half().numpy(),
+        baseline=stack.baseline.reshape(1).float().numpy(),
+    )
+
+
+def _gray_tensor(workspace: Workspace, view: View) -> Tensor:
+    return torch.from_numpy(read_gray(workspace.image_path(view.name)))[None, None]
+
+
+def _source_tensors(
+    workspace: Workspace, reference: View, source: View
+) -> SourceTensors:
+    return SourceTensors(
+        gray=_gray_tensor(workspace, source),
+        K=torch.from_numpy(index_K(source.camera))[None],
+        source_from_reference=torch.from_numpy(cam_from_cam(source, reference))[None],
+    )
+
+
+def _with_holes(depth: DepthMap, sample: Sample, config: NetworkConfig) -> DepthMap:
+    names = [name for name in config.channels if name != "inverse_depth"]
+    if "photo_consistency" not in names:
+        return depth
+    consistency = sample.guidance[names.index("photo_consistency")]
+    kept = np.where(consistency < HOLES_CONSISTENCY, depth, 0.0).astype(np.float32)
+    return kept if (kept > 0).mean() > 0.05 else depth
+
+
+def _write_sample(path: Path, sample: Sample) -> None:
+    import io
+
+    buffer = io.BytesIO()
+    np.savez(buffer, **sample._asdict())
+    write_whole(path, buffer.getvalue())
+
+
+def _read_sample(path: Path) -> Sample:
+    with np.load(path) as arrays:
+        return Sample(**{name: arrays[name] for name in Sample._fields})
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class CropSampler:
+    """Random crops of samples; step n gives the same batch whenever it is asked for.
+
+    Attributes:
+        paths: The samples.
+        config: The network that they were made for.
+        batch_size: Crops in a batch.
+        crop_px: Largest side of a crop; smaller where an image is smaller.
+        seed: Seed of all choices.
+        holes_share: Share of samples whose maps have holes.
+    """
+
+    paths: tuple[Path, ...]
+    config: NetworkConfig
+    batch_size: int
+    crop_px: int
+    seed: int
+    holes_share: float = 0.2
+
+    def batch(self, step: int) -> Batch:
+        """The batch of a step: crop, flip, change brightness, normalise."""
+        rng = np.random.default_rng((self.seed, step))
+        holes = [path for path in self.paths if path.stem.endswith("-holes")]
+        dense = [path for path in self.paths if not path.stem.endswith("-holes")]
+        pools = [
+            holes if holes and rng.random() < self.holes_share else dense
+            for _ in range(self.batch_size)
+        ]
+        chosen = [pool[int(rng.integers(len(pool)))] for pool in pools]
+        crops = [self._crop(_read_sample(path), rng) for path in chosen]
+        stack = InputStack(
+            inverse_depth=_stacked([crop.inverse_depth[None] for crop in crops]),
+            valid=_stacked([crop.valid[None] for crop in crops]),
+            guidance=_stacked([crop.guidance.astype(np.float32) for crop in crops]),
+            baseline=_stacked([crop.baseline[:, None, None] for crop in crops]),
+        )
+        inputs, scaling = network_input(stack, self.config)
+        target = _stacked([crop.target[None] for crop in crops])
+        known = target > 0
+        weight = scaling.offset / torch.where(known, target, scaling.offset)
+        return Batch(
+            inputs=inputs,
+            target=scaling.normalise(target),
+            known=known,
+            weight=weight.clamp(*NEAR_TRUTH_WEIGHT),
+            names=tuple(path.stem for path in chosen),
+        )
+
+    def _crop(self, sample: Sample, rng: np.random.Generator) -> Sample:
+        multiple_px = self.config.multiple_px
+        height, width = sample.target.shape
+        rows = _window(height, self.crop_px, multiple_px, rng)
+        columns = _window(width, self.crop_px, multiple_px, rng)
+        flip = -1 if rng.random() < 0.5 else 1
+
+        def cut(values: NDArray) -> NDArray:  # type: ignore[type-arg] # any dtype
+            cropped = values[..., rows, columns][..., ::flip]
+            return np.ascontiguousarray(cropped)
+
+        guidance = self._other_light(cut(sample.guidance).astype(np.float32), rng)
+        return Sample(
+            inverse_depth=cut(sample.inverse_depth),
+            target=cut(sample.target),
+            valid=cut(sample.valid),
+            guidance=guidance.astype(np.float16),
+            baseline=sample.baseline,
+        )
+
+    def _other_light(
+        self, guidance: NDArray[np.float32], rng: np.random.Generator
+    ) -> NDArray[np.float32]:
+        """Another gamma and brightness for all images, and a little for each."""
+        names = [name for name in self.config.channels if name != "inverse_depth"]
+        gamma, gain = np.exp(rng.normal(0.0, 0.15)), np.exp(rng.normal(0.0, 0.1))
+        for index, name in enumerate(names):
+            if name == "reference" or name.startswith("source"):
+                own = gamma * np.exp(rng.normal(0.0, 0.05))
+                gray = np.clip(guidance[index], 0.0, 1.0) ** own
+                gray = gray * gain * np.exp(rng.normal(0.0, 0.05))
+                guidance[index] = np.clip(gray, 0.0, 1.0)
+        return guidance
+
+
+def _stacked(arrays: Sequence[NDArray]) -> Tensor:  # type: ignore[type-arg] # any dtype
+    return torch.from_numpy(np.stack(arrays))
+
+
+def _window(
+    size_px: int, crop_px: int, multiple_px: int, rng: np.random.Generator
+) -> slice:
+    length = min(crop_px, size_px) // multiple_px * multiple_px
+    if length == 0:
+        raise TrainingError(
+            f"an image side of {size_px} px is too small for a network that halves it "
+            f"to 1/{multiple_px}; train on larger images or with fewer levels."
+        )
+    start = int(rng.integers(size_px - length + 1))
+    return slice(start, start + length)

@@ -1,0 +1,146 @@
+"""Laws of the training: the same steps whatever the stops; what a bad batch does."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from planes import write_plane_workspace
+
+from resdepth_colmap.config import NetworkConfig, TrainConfig
+from resdepth_colmap.errors import TrainingError
+from resdepth_colmap.io.depth_map import read_depth_map, write_depth_map
+from resdepth_colmap.network.weights import load_weights
+from resdepth_colmap.training.dataset import CropSampler, prepare_samples
+from resdepth_colmap.training.loop import train
+
+NETWORK = NetworkConfig(levels=3, base_channels=4, max_channels=8)
+TRAINING = TrainConfig(steps=4, batch_size=2, crop_px=32, checkpoint_steps=2)
+
+
+@pytest.fixture
+def workspace(tmp_path: Path) -> Path:
+    """The exact plane, with maps that are wrong in a tenth of the pixels."""
+    path = tmp_path / "plane"
+    rng = np.random.default_rng(0)
+    for view in write_plane_workspace(path, kinds=("photometric",)):
+        name = view.view.name
+        noisy = view.depth * np.where(rng.random(view.depth.shape) < 0.1, 1.3, 1.0)
+        write_depth_map(
+            path / "stereo" / "depth_maps" / f"{name}.photometric.bin",
+            noisy.astype(np.float32),
+        )
+        write_depth_map(path / "ground_truth" / f"{name}.bin", view.depth)
+    return path
+
+
+def _parameters(path: Path) -> dict[str, torch.Tensor]:
+    return dict(load_weights(path).state_dict())
+
+
+def test_a_stopped_training_ends_with_the_same_weights(
+    workspace: Path, tmp_path: Path
+) -> None:
+    whole = train([workspace], tmp_path / "whole", NETWORK, TRAINING)
+    interrupted = tmp_path / "interrupted"
+
+    class Stop(Exception):  # noqa: N818
+        pass
+
+    class StoppingProgress:
+        """Stops the training in its third step."""
+
+        def stage(self, title: str, total: int) -> "StoppingProgress":
+            self.done, self.stops = 0, title == "Training"
+            return self
+
+        def __enter__(self) -> "StoppingProgress":
+            return self
+
+        def __exit__(self, *_: object) -> None:
+            return None
+
+        def __call__(self, units: float) -> None:
+            self.done += 1
+            if self.stops and self.done == 4:  # the first call says where it starts
+                raise Stop
+
+    with pytest.raises(Stop):
+        train([workspace], interrupted, NETWORK, TRAINING, StoppingProgress())  # type: ignore[arg-type] # one object is listener, manager and advance
+    resumed = train([workspace], interrupted, NETWORK, TRAINING)
+    first, second = _parameters(whole), _parameters(resumed)
+    assert all(torch.equal(first[name], second[name]) for name in first)
+
+
+def test_the_log_has_a_line_for_each_checkpoint(
+    workspace: Path, tmp_path: Path
+) -> None:
+    train([workspace], tmp_path / "run", NETWORK, TRAINING)
+    lines = (tmp_path / "run" / "log.csv").read_text().splitlines()
+    assert lines[0] == "step,loss,held_out_loss"
+    assert [line.split(",")[0] for line in lines[1:]] == ["2", "4"]
+
+
+@pytest.mark.slow
+def test_training_on_one_scene_lowers_its_loss(workspace: Path, tmp_path: Path) -> None:
+    config = TrainConfig(
+        steps=200, batch_size=4, crop_px=32, checkpoint_steps=20, learning_rate=5e-3
+    )
+    network = NetworkConfig(levels=3, base_channels=16, max_channels=32)
+    train([workspace], tmp_path / "run", network, config)
+    lines = (tmp_path / "run" / "log.csv").read_text().splitlines()[1:]
+    losses = [float(line.split(",")[1]) for line in lines]
+    assert losses[-1] < 0.6 * losses[0]
+
+
+def test_a_loss_that_is_no_number_names_its_batch(
+    workspace: Path, tmp_path: Path
+) -> None:
+    output = tmp_path / "run"
+    for path in prepare_samples([workspace], NETWORK, output / "samples"):
+        with np.load(path) as arrays:
+            changed = {name: arrays[name] for name in arrays.files}
+        changed["inverse_depth"] = np.full_like(changed["inverse_depth"], np.nan)
+        np.savez(path, **changed)
+    with pytest.raises(TrainingError, match=r"step 0 is nan.*plane-"):
+        train([workspace], output, NETWORK, TRAINING)
+
+
+def test_a_workspace_without_truth_says_what_is_missing(tmp_path: Path) -> None:
+    write_plane_workspace(tmp_path / "plane", kinds=())
+    with pytest.raises(TrainingError, match="ground_truth"):
+        train([tmp_path / "plane"], tmp_path / "run", NETWORK, TRAINING)
+
+
+def test_a_step_has_the_same_batch_whenever_it_is_asked_for(
+    workspace: Path, tmp_path: Path
+) -> None:
+    paths = tuple(prepare_samples([workspace], NETWORK, tmp_path))
+    sampler = CropSampler(paths=paths, config=NETWORK, batch_size=2, crop_px=32, seed=3)
+    first, other, again = sampler.batch(5), sampler.batch(6), sampler.batch(5)
+    assert first.names == again.names
+    assert torch.equal(first.inputs, again.inputs)
+    assert not torch.equal(first.inputs, other.inputs)
+
+
+def test_where_the_map_is_right_input_and_target_are_the_same(
+    workspace: Path, tmp_path: Path
+) -> None:
+    paths = tuple(prepare_samples([workspace], NETWORK, tmp_path))
+    paths = tuple(path for path in paths if path.stem.endswith("-dense"))
+    sampler = CropSampler(paths=paths, config=NETWORK, batch_size=4, crop_px=32, seed=0)
+    batch = sampler.batch(0)
+    error = (batch.inputs[:, :1] - batch.target).abs()[batch.known]
+    assert (error < 1e-3).float().mean() > 0.8
+
+
+def test_the_copy_with_holes_is_told_so(workspace: Path, tmp_path: Path) -> None:
+    paths = prepare_samples([workspace], NETWORK, tmp_path)
+    shares = {}
+    for path in paths:
+        with np.load(path) as arrays:
+            shares[path.stem.rsplit("-", 1)[1]] = float(arrays["valid"].mean())
+    assert shares["dense"] == 1.0
+    assert shares["holes"] < 1.0
+    name = sorted((workspace / "ground_truth").rglob("*.bin"))[0]
+    assert read_depth_map(name).min() > 0
