@@ -1,0 +1,145 @@
+"""What is refined from what: for each image its map, its second views, its hash."""
+
+import dataclasses
+import hashlib
+import importlib.metadata
+import json
+import logging
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from resdepth_colmap.geometry.view_selection import SourceChoice, choose_sources
+from resdepth_colmap.io.patch_match_cfg import SourceKind, read_sources
+from resdepth_colmap.io.workspace import Workspace
+from resdepth_colmap.pipeline.initial_map import candidate_kinds, map_path
+from resdepth_colmap.scene import Scene, View
+
+logger = logging.getLogger(__name__)
+
+Skipped = tuple[tuple[str, str], ...]
+"""Name and reason of each image that is not refined."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class ViewPlan:
+    """What an image is refined from.
+
+    Attributes:
+        index: Its place in the scene.
+        kinds: The maps to choose from.
+        sources: Its second views, best first; () for a network that needs none.
+        fingerprint: A hash of all that its refined map depends on.
+    """
+
+    index: int
+    kinds: tuple[str, ...]
+    sources: tuple[SourceChoice, ...]
+    fingerprint: str
+
+
+def plan_views(
+    workspace: Workspace,
+    scene: Scene,
+    requested: str,
+    num_sources: int,
+    options: dict[str, Any],
+) -> tuple[tuple[ViewPlan, ...], Skipped]:
+    """Decide what each image is refined from, without reading a map.
+
+    Args:
+        workspace: Where the maps lie.
+        scene: The views. An explicit list of sources in patch-match.cfg is what the
+            second views are chosen from; else all views are.
+        requested: The kind of map to start from, or auto.
+        num_sources: Second views that the network looks at; may be 0.
+        options: What else decides the result: it becomes part of the hash.
+
+    Returns:
+        The plans, in the order of the scene; and what is skipped, and why.
+
+    Raises:
+        WorkspaceError: If patch-match.cfg is malformed.
+    """
+    listed = _listed_sources(workspace, scene)
+    plans, skipped = [], []
+    for index, view in enumerate(scene.views):
+        kinds = candidate_kinds(workspace, view.name, requested)
+        if not kinds:
+            skipped.append((view.name, _no_map(workspace, view.name, requested)))
+            continue
+        sources: tuple[SourceChoice, ...] = ()
+        if num_sources:
+            sources = choose_sources(scene, index, num_sources, listed.get(view.name))
+            if not sources:
+                skipped.append((view.name, "no other view overlaps with it"))
+                continue
+        fingerprint = _fingerprint(workspace, scene, (index, kinds, sources), options)
+        plan = ViewPlan(
+            index=index, kinds=kinds, sources=sources, fingerprint=fingerprint
+        )
+        plans.append(plan)
+    return tuple(plans), tuple(skipped)
+
+
+def _listed_sources(workspace: Workspace, scene: Scene) -> dict[str, tuple[int, ...]]:
+    """The sources that patch-match.cfg names for an image, where it names any."""
+    path = workspace.stereo_path / "patch-match.cfg"
+    if not path.is_file():
+        return {}
+    listed = {}
+    for name, spec in read_sources(path).items():
+        if spec.kind is not SourceKind.EXPLICIT:
+            continue
+        indices = tuple(scene.index(source) for source in spec.names)
+        known = tuple(index for index in indices if index >= 0)
+        if known:
+            listed[name] = known
+        else:
+            logger.warning(
+                "%s: the model has none of the sources of %s; choosing others.",
+                path,
+                name,
+            )
+    return listed
+
+
+def _no_map(workspace: Workspace, name: str, requested: str) -> str:
+    kinds = workspace.original_kinds(name)
+    if not kinds:
+        return "no depth map"
+    return f"no {requested} depth map (there is: {', '.join(kinds)})"
+
+
+def _fingerprint(
+    workspace: Workspace,
+    scene: Scene,
+    inputs: tuple[int, tuple[str, ...], tuple[SourceChoice, ...]],
+    options: dict[str, Any],
+) -> str:
+    index, kinds, sources = inputs
+    view = scene.views[index]
+    views = [view, *(scene.views[source.index] for source in sources)]
+    facts = {
+        "package": importlib.metadata.version("resdepth-colmap"),
+        "options": options,
+        "views": [_facts_of(v) for v in views],
+        "images": _stamps(workspace.image_path(v.name) for v in views),
+        "maps": [kinds, _stamps(map_path(workspace, view.name, k) for k in kinds)],
+    }
+    text = json.dumps(facts, sort_keys=True, default=str)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _facts_of(view: View) -> list[Any]:
+    camera = dataclasses.asdict(view.camera)
+    return [view.name, camera, view.cam_from_world.tolist()]
+
+
+def _stamps(paths: Iterable[Path]) -> list[tuple[int, int]]:
+    """Size and time of files, (0, 0) for one that is not there: no file is read."""
+    stamps = []
+    for path in paths:
+        status = path.stat() if path.is_file() else None
+        stamps.append((status.st_size, status.st_mtime_ns) if status else (0, 0))
+    return stamps
