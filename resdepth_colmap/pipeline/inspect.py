@@ -1,0 +1,250 @@
+"""What a workspace holds, what `refine` would do with it, and what that would cost."""
+
+import collections
+import dataclasses
+import os
+from typing import Any
+
+import numpy as np
+
+from resdepth_colmap.config import RefineConfig, StereoBackend, StereoConfig
+from resdepth_colmap.errors import WorkspaceError
+from resdepth_colmap.io.depth_map import read_depth_map, read_map_size
+from resdepth_colmap.io.workspace import Workspace, missing_images
+from resdepth_colmap.pipeline.initial_map import (
+    candidate_kinds,
+    check_map_size,
+    map_path,
+)
+from resdepth_colmap.pipeline.stereo import choose_backend
+from resdepth_colmap.scene import Scene, View
+
+MOST_MAPS_READ = 8  # of each kind, spread over the views: info is to be quick
+CFG_NAMES = ("patch-match.cfg", "fusion.cfg")
+
+# Measured on two cores of a 2.x GHz server (docs/benchmarks.md); a guide, no promise.
+MEASURED_CORES = 2
+STEREO_S_PER_MEGAPIXEL = 60.0
+REFINE_S_PER_MEGAPIXEL_AND_PASS = 6.0
+REFINE_BASE_MB = 900.0  # libraries, weights, one tile in the network
+REFINE_MB_PER_MEGAPIXEL = 150.0  # images, warped views and maps of one view
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class MapSummary:
+    """The maps of one kind.
+
+    Attributes:
+        num_maps: Images that have such a depth map.
+        num_normal_maps: Images that have such a normal map.
+        filled: Mean share of pixels with a depth, in 0..1, over `num_read` maps.
+        num_read: How many maps were read for it.
+    """
+
+    num_maps: int
+    num_normal_maps: int
+    filled: float
+    num_read: int
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Estimate:
+    """What a run would cost on this machine, roughly and on its CPU.
+
+    Attributes:
+        megapixels: Sum over the views that would be refined.
+        stereo_s: Seconds of PatchMatch; 0 if maps are there.
+        refine_s: Seconds of refinement.
+        memory_mb: Peak memory in MiB, fusion not counted.
+    """
+
+    megapixels: float
+    stereo_s: float
+    refine_s: float
+    memory_mb: float
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Inspection:
+    """What was found; see the attributes' names.
+
+    Attributes:
+        path: The workspace.
+        num_views: Images with a pose.
+        num_cameras: Different cameras.
+        image_sizes: Width, height in pixels and number of each size.
+        num_points: Sparse points.
+        maps: The maps there are, by kind.
+        missing_images: Images of the model without a file.
+        cfg_files: COLMAP's cfg files that are there.
+        stereo_backend: Where initial depth would come from.
+        num_refined: Images that `refine` would refine.
+        estimate: Time and memory to expect.
+        warnings: What may surprise.
+    """
+
+    path: str
+    num_views: int
+    num_cameras: int
+    image_sizes: tuple[tuple[int, int, int], ...]
+    num_points: int
+    maps: dict[str, MapSummary]
+    missing_images: tuple[str, ...]
+    cfg_files: tuple[str, ...]
+    stereo_backend: StereoBackend
+    num_refined: int
+    estimate: Estimate
+    warnings: tuple[str, ...]
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Plain values only, ready for JSON."""
+        return {**dataclasses.asdict(self), "stereo_backend": str(self.stereo_backend)}
+
+
+def inspect_workspace(
+    workspace: Workspace,
+    scene: Scene,
+    refine: RefineConfig | None = None,
+    stereo: StereoConfig | None = None,
+) -> Inspection:
+    """Look at a workspace; nothing is changed, and a broken map is but a warning.
+
+    Args:
+        workspace: Where its files lie.
+        scene: Its model.
+        refine: Options of the run to foresee; None = the defaults.
+        stereo: Options of its PatchMatch; None = the defaults.
+    """
+    refine, stereo = refine or RefineConfig(), stereo or StereoConfig()
+    maps, broken = _summaries(workspace, scene)
+    backend = choose_backend(StereoBackend.AUTO, workspace, scene)
+    missing = missing_images(workspace, scene)
+    refined = _refined_views(workspace, scene, backend, refine.input)
+    sizes = collections.Counter(
+        (view.camera.width_px, view.camera.height_px) for view in scene.views
+    )
+    found = Inspection(
+        path=str(workspace.path),
+        num_views=len(scene.views),
+        num_cameras=len({view.camera for view in scene.views}),
+        image_sizes=tuple((*size, number) for size, number in sorted(sizes.items())),
+        num_points=scene.num_points,
+        maps=maps,
+        missing_images=missing,
+        cfg_files=tuple(n for n in CFG_NAMES if (workspace.stereo_path / n).is_file()),
+        stereo_backend=backend,
+        num_refined=len(refined),
+        estimate=_estimate(workspace, refined, backend, refine, stereo),
+        warnings=broken,
+    )
+    return dataclasses.replace(found, warnings=(*broken, *_warnings(found)))
+
+
+def _refined_views(
+    workspace: Workspace, scene: Scene, backend: StereoBackend, requested: str
+) -> list[View]:
+    if backend is not StereoBackend.EXISTING:
+        return list(scene.views)
+    return [v for v in scene.views if candidate_kinds(workspace, v.name, requested)]
+
+
+def _summaries(
+    workspace: Workspace, scene: Scene
+) -> tuple[dict[str, MapSummary], tuple[str, ...]]:
+    views_of: dict[str, list[View]] = collections.defaultdict(list)
+    for view in scene.views:
+        for kind in workspace.original_kinds(view.name):
+            views_of[kind].append(view)
+    summaries: dict[str, MapSummary] = {}
+    broken: list[str] = []
+    for kind, views in sorted(views_of.items()):
+        shares, errors = _filled_shares(workspace, kind, views)
+        broken += errors
+        normals = (workspace.normal_map_path(view.name, kind) for view in views)
+        summaries[kind] = MapSummary(
+            num_maps=len(views),
+            num_normal_maps=sum(path.is_file() for path in normals),
+            filled=float(np.mean(shares)) if shares else 0.0,
+            num_read=len(shares),
+        )
+    return summaries, tuple(broken)
+
+
+def _filled_shares(
+    workspace: Workspace, kind: str, views: list[View]
+) -> tuple[list[float], list[str]]:
+    step = max(1, -(-len(views) // MOST_MAPS_READ))
+    shares, errors = [], []
+    for view in views[::step]:
+        path = map_path(workspace, view.name, kind)
+        try:
+            check_map_size(path, view.camera)
+            depth = read_depth_map(path)
+            shares.append(float(np.count_nonzero(depth) / depth.size))
+        except WorkspaceError as error:
+            errors.append(str(error))
+    return shares, errors
+
+
+def _estimate(
+    workspace: Workspace,
+    views: list[View],
+    backend: StereoBackend,
+    refine: RefineConfig,
+    stereo: StereoConfig,
+) -> Estimate:
+    sizes = [_megapixels(workspace, view, stereo.max_image_size) for view in views]
+    total, largest = sum(sizes), max(sizes, default=0.0)
+    slowness = MEASURED_CORES / max(1, os.cpu_count() or 1)
+    matched = backend is StereoBackend.CPU
+    stereo_s = STEREO_S_PER_MEGAPIXEL * total * slowness if matched else 0.0
+    return Estimate(
+        megapixels=total,
+        stereo_s=stereo_s,
+        refine_s=REFINE_S_PER_MEGAPIXEL_AND_PASS * refine.passes * total * slowness,
+        memory_mb=REFINE_BASE_MB + REFINE_MB_PER_MEGAPIXEL * largest,
+    )
+
+
+def _megapixels(workspace: Workspace, view: View, max_image_size: int) -> float:
+    """Size of the map that is there, else of the one that PatchMatch would make."""
+    for kind in workspace.original_kinds(view.name):
+        try:
+            width_px, height_px = read_map_size(map_path(workspace, view.name, kind))
+        except WorkspaceError:
+            continue
+        return width_px * height_px / 1e6
+    width_px, height_px = view.camera.width_px, view.camera.height_px
+    scale = 1.0
+    if max_image_size > 0:
+        scale = min(1.0, max_image_size / max(width_px, height_px))
+    return width_px * height_px * scale**2 / 1e6
+
+
+def _warnings(found: Inspection) -> list[str]:
+    warnings = []
+    if found.missing_images:
+        shown = ", ".join(found.missing_images[:3])
+        warnings.append(
+            f"{len(found.missing_images)} images of the model have no file ({shown}...)"
+            if len(found.missing_images) > 3
+            else f"images of the model without a file: {shown}"
+        )
+    if found.num_views < 2:
+        warnings.append("one image only: no second view to compare with")
+    if found.num_points == 0:
+        warnings.append(
+            "no sparse points: views are paired by pose, depth ranges are guessed, and "
+            "COLMAP's own fusion gives no points (its pycolmap needs min_num_pixels=1)"
+        )
+    if found.maps and 0 < found.num_refined < found.num_views:
+        without = found.num_views - found.num_refined
+        warnings.append(f"{without} images have no depth map and would be skipped")
+    for kind, summary in found.maps.items():
+        if summary.num_normal_maps < summary.num_maps:
+            without = summary.num_maps - summary.num_normal_maps
+            warnings.append(
+                f"{without} {kind} maps have no normal map: COLMAP's fusion of the "
+                "originals would fail (refined maps get their own)"
+            )
+    return warnings
