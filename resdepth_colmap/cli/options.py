@@ -72,6 +72,7 @@ def attribute_helps(kind: type[Any]) -> dict[str, str]:
 def _option(field: "dataclasses.Field[Any]", text: str) -> Callable[[Command], Command]:
     flag = "--" + field.name.replace("_", "-")
     if isinstance(field.default, bool):
+        flag += f"/--no-{flag[2:]}" if field.default else ""
         return click.option(flag, is_flag=True, default=field.default, help=text)
     return click.option(
         flag,

@@ -1,0 +1,51 @@
+"""The command `export`: depth maps in the formats of other programs."""
+
+from pathlib import Path
+
+import click
+
+from resdepth_colmap.cli.options import example, workspace_argument
+from resdepth_colmap.pipeline.export_config import REFINED, MapFormat
+
+
+@click.command(
+    short_help="Write depth maps as NPY, PFM or 16-bit PNG.",
+    epilog=example(
+        "export scene/dense --format pfm --output depth/",
+        "export scene/dense --format png16 --maps photometric --output depth/",
+    ),
+)
+@workspace_argument
+@click.option(
+    "--format",
+    "kind",
+    type=click.Choice(MapFormat),
+    default=MapFormat.NPY,
+    show_default=True,
+    help="npy: float32; pfm: float32; png16: 16-bit grey, depth = value * "
+    "unit of depth_scale.json. 0 = no depth in all.",
+)
+@click.option(
+    "--maps",
+    default=REFINED,
+    show_default=True,
+    help="Which maps: refined, or a kind in WORKSPACE/stereo (photometric, ...).",
+)
+@click.option(
+    "--output",
+    type=click.Path(path_type=Path, file_okay=False),
+    required=True,
+    help="Folder to write to.",
+)
+def export(workspace: Path, kind: MapFormat, maps: str, output: Path) -> None:
+    """Write the depth maps of WORKSPACE for programs that do not know COLMAP's format.
+
+    The path of each file is printed. Files of the same name are replaced.
+    """
+    from resdepth_colmap.cli.log import BarProgress
+    from resdepth_colmap.io.workspace import open_workspace
+    from resdepth_colmap.pipeline.export import export_maps
+
+    opened = open_workspace(workspace)
+    for path in export_maps(opened, output, kind, maps, BarProgress()):
+        click.echo(path)

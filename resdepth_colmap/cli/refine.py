@@ -1,0 +1,81 @@
+"""The command `refine`: the whole road."""
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from resdepth_colmap.cli.options import (
+    build_config,
+    config_options,
+    example,
+    overwrite_option,
+    workspace_argument,
+)
+from resdepth_colmap.config import (
+    FuseConfig,
+    RefineConfig,
+    StereoBackend,
+    StereoConfig,
+)
+from resdepth_colmap.pipeline.run_config import RunConfig
+
+
+@click.command(
+    short_help="Refine depth maps, fuse them, show what changed.",
+    epilog=example(
+        "refine scene/dense",
+        "refine scene/dense --stereo cpu --max-image-size 1000 --passes 2",
+    ),
+)
+@workspace_argument
+@click.option(
+    "--stereo",
+    "backend",
+    type=click.Choice(StereoBackend),
+    default=RunConfig.backend,
+    show_default=True,
+    help="Where initial depth comes from: the maps that are there, COLMAP's "
+    "PatchMatch (needs CUDA), or ours on the CPU; auto takes the first that works.",
+)
+@config_options(RefineConfig)
+@config_options(StereoConfig, "max_image_size")
+@config_options(FuseConfig)
+@click.option(
+    "--cloud-format",
+    type=click.Choice(type(RunConfig.cloud_format)),
+    default=RunConfig.cloud_format,
+    show_default=True,
+    help="File format of the cloud.",
+)
+@click.option("--no-fuse", is_flag=True, help="Stop after the depth maps.")
+@click.option("--no-pictures", is_flag=True, help="Make no pictures of the change.")
+@click.option(
+    "--in-place",
+    is_flag=True,
+    help="Put the refined maps into WORKSPACE/stereo as the geometric ones; the "
+    "originals are kept beside them.",
+)
+@overwrite_option
+def refine(workspace: Path, backend: StereoBackend, **values: Any) -> None:
+    """Refine the depth maps of WORKSPACE and fuse them into a cloud.
+
+    WORKSPACE is the folder that `colmap image_undistorter` wrote. The result goes to
+    WORKSPACE/resdepth, a complete COLMAP workspace itself. A second run does only what
+    is missing or has changed.
+    """
+    config = RunConfig(
+        backend=backend,
+        stereo=build_config(StereoConfig, values),
+        refine=build_config(RefineConfig, values),
+        fuse=build_config(FuseConfig, values),
+        **{name: values[name] for name in _RUN_OPTIONS},
+    )
+    from resdepth_colmap.cli.log import BarProgress
+    from resdepth_colmap.cli.report import show_run
+    from resdepth_colmap.pipeline.run import run_refine
+
+    show_run(run_refine(workspace, config, BarProgress()))
+
+
+_RUN_OPTIONS = ("no_fuse", "no_pictures", "cloud_format", "in_place", "overwrite")

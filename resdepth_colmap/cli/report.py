@@ -1,0 +1,139 @@
+"""What the commands print on stdout."""
+
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rich.table import Table
+
+    from resdepth_colmap.evaluation.depth_metrics import DepthMetrics
+    from resdepth_colmap.evaluation.truth import Comparison
+    from resdepth_colmap.pipeline.inspect import Inspection
+    from resdepth_colmap.pipeline.run import RunResult
+
+LABEL_WIDTH = 16
+
+
+def show_line(label: str, text: object) -> None:
+    """One fact: a label and what there is to say."""
+    click.echo(f"{label:<{LABEL_WIDTH}}{text}")
+
+
+def show_table(table: "Table") -> None:
+    """A table on stdout; never cut off, also where stdout is no terminal."""
+    from rich.console import Console
+
+    console = Console(soft_wrap=True, highlight=False)
+    console.print(table)
+
+
+def duration(seconds: float) -> str:
+    """Seconds for people: "45 s", "12 min", "3.5 h"."""
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    if seconds < 90 * 60:
+        return f"{seconds / 60:.0f} min"
+    return f"{seconds / 3600:.1f} h"
+
+
+def show_run(result: "RunResult") -> None:
+    """What `refine` did, and where it lies."""
+    refine = result.refine
+    show_line("refined", f"{len(refine.refined)} images")
+    if refine.kept:
+        show_line("kept", f"{len(refine.kept)} images, finished by an earlier run")
+    if refine.skipped:
+        show_line("skipped", f"{len(refine.skipped)} images (see the log)")
+    show_line("depth maps", refine.output.workspace.stereo_path / "depth_maps")
+    if result.cloud_path is not None:
+        before = result.num_points_before
+        points = f"{result.num_points:,} points"
+        if before is not None:
+            points += f"; {before:,} without refinement"
+        show_line("cloud", f"{result.cloud_path} ({points})")
+    if result.overview_path is not None:
+        show_line("pictures", result.overview_path)
+    show_line("record", refine.output.record_path)
+
+
+def show_inspection(found: "Inspection") -> None:
+    """What `info` found, for people."""
+    sizes = ", ".join(f"{n} of {w} x {h}" for w, h, n in found.image_sizes)
+    show_line("workspace", found.path)
+    show_line("images", f"{found.num_views} ({sizes} px)")
+    show_line("missing images", len(found.missing_images))
+    show_line("cameras", found.num_cameras)
+    show_line("sparse points", f"{found.num_points:,}" if found.num_points else "none")
+    show_line("cfg files", ", ".join(found.cfg_files) or "none")
+    if found.maps:
+        _show_maps(found)
+    else:
+        show_line("depth maps", "none")
+    _show_plan(found)
+    for warning in found.warnings:
+        show_line("warning", warning)
+
+
+def _show_maps(found: "Inspection") -> None:
+    from rich.table import Table
+
+    table = Table("maps", "depth", "normal", "filled")
+    for kind, summary in found.maps.items():
+        table.add_row(
+            kind,
+            f"{summary.num_maps} of {found.num_views}",
+            f"{summary.num_normal_maps} of {found.num_views}",
+            f"{summary.filled:.1%} (mean of {summary.num_read})",
+        )
+    show_table(table)
+
+
+def _show_plan(found: "Inspection") -> None:
+    origin = {
+        "existing": "the maps that are there",
+        "colmap": "COLMAP's PatchMatch (CUDA)",
+        "cpu": "PatchMatch on the CPU",
+    }
+    cost = found.estimate
+    show_line("refine would", f"take depth from {origin[str(found.stereo_backend)]},")
+    show_line("", f"refine {found.num_refined} of {found.num_views} images")
+    if cost.stereo_s:
+        show_line("PatchMatch", f"about {duration(cost.stereo_s)}")
+    show_line("refinement", f"about {duration(cost.refine_s)}")
+    show_line("memory", f"about {cost.memory_mb / 1024:.1f} GiB")
+
+
+def show_comparison(comparisons: "Sequence[Comparison]") -> None:
+    """The error of each image's depth before and after, and the mean over them."""
+    from rich.table import Table
+
+    table = Table("image", "mean error", "refined", "off by > 2 %", "refined")
+    for comparison in comparisons:
+        table.add_row(comparison.name, *_errors(comparison.before, comparison.after))
+    rows = [(c.before, c.after) for c in comparisons]
+    mean = [
+        sum(getattr(row[index], name) for row in rows) / len(rows)
+        for name in ("mae", "bad_2")
+        for index in (0, 1)
+    ]
+    table.add_section()
+    table.add_row("mean", *_shown_errors(*mean))
+    show_table(table)
+
+
+def _errors(before: "DepthMetrics", after: "DepthMetrics") -> tuple[str, ...]:
+    return _shown_errors(before.mae, after.mae, before.bad_2, after.bad_2)
+
+
+def _shown_errors(
+    mae_before: float, mae_after: float, bad_before: float, bad_after: float
+) -> tuple[str, ...]:
+    return (
+        f"{mae_before:.4f}",
+        f"{mae_after:.4f} ({mae_after / mae_before - 1.0:+.0%})" if mae_before else "",
+        f"{bad_before:.1%}",
+        f"{bad_after:.1%}",
+    )

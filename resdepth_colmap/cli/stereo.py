@@ -1,0 +1,61 @@
+"""The command `stereo`: initial depth alone."""
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from resdepth_colmap.cli.options import (
+    build_config,
+    config_options,
+    example,
+    overwrite_option,
+    workspace_argument,
+)
+from resdepth_colmap.config import StereoBackend, StereoConfig
+
+
+@click.command(
+    short_help="Make initial depth maps by PatchMatch.",
+    epilog=example(
+        "stereo scene/dense --max-image-size 1000",
+        "stereo scene/dense --PatchMatchStereo.window_radius 7",
+    ),
+)
+@workspace_argument
+@click.option(
+    "--stereo",
+    "backend",
+    type=click.Choice(StereoBackend),
+    default=StereoBackend.CPU,
+    show_default=True,
+    help="Whose PatchMatch: COLMAP's (needs CUDA), or ours on the CPU.",
+)
+@config_options(StereoConfig)
+@overwrite_option
+def stereo(
+    workspace: Path, backend: StereoBackend, overwrite: bool, **values: Any
+) -> None:
+    """Make the photometric depth and normal maps that WORKSPACE lacks.
+
+    They go to WORKSPACE/stereo, in COLMAP's format. The options have COLMAP's names and
+    are taken in its spelling too. Maps that are there are kept.
+    """
+    config = build_config(StereoConfig, values)
+    from resdepth_colmap.cli.log import BarProgress
+    from resdepth_colmap.io.model import read_scene
+    from resdepth_colmap.io.workspace import check_images, open_workspace
+    from resdepth_colmap.pipeline.stereo import stereo_workspace
+
+    opened = open_workspace(workspace)
+    scene = read_scene(opened.sparse_path, opened.images_path, opened.path)
+    check_images(opened, scene)
+    report = stereo_workspace(
+        opened, scene, config, backend, overwrite=overwrite, progress=BarProgress()
+    )
+    click.echo(f"backend   {report.backend}")
+    click.echo(f"matched   {len(report.matched)} images")
+    click.echo(f"kept      {len(report.kept)} images")
+    for name, reason in report.skipped:
+        click.echo(f"skipped   {name}: {reason}")
+    click.echo(f"maps      {opened.stereo_path / 'depth_maps'}")

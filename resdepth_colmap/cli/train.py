@@ -1,0 +1,45 @@
+"""The command `train`."""
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from resdepth_colmap.cli.options import build_config, config_options, example
+from resdepth_colmap.config import NetworkConfig, TrainConfig
+
+
+@click.command(
+    short_help="Train a network on workspaces with known depth.",
+    epilog=example(
+        "synthesize rooms/ --num-scenes 100 --num-views 3",
+        "stereo rooms/room_000000",
+        "train rooms/room_* --output training/",
+    ),
+)
+@click.argument(
+    "workspaces",
+    nargs=-1,
+    required=True,
+    type=click.Path(path_type=Path, exists=True, file_okay=False),
+)
+@click.option(
+    "--output",
+    type=click.Path(path_type=Path, file_okay=False),
+    required=True,
+    help="Folder of weights, state and log; a stopped training goes on from it.",
+)
+@config_options(TrainConfig)
+@config_options(NetworkConfig)
+def train(workspaces: tuple[Path, ...], output: Path, **values: Any) -> None:
+    """Train a network on WORKSPACES that have depth maps and a ground_truth folder.
+
+    The path of the weights is printed, for `refine --weights`.
+    """
+    network_config = build_config(NetworkConfig, values)
+    config = build_config(TrainConfig, values)
+    from resdepth_colmap.cli.log import BarProgress
+    from resdepth_colmap.training.loop import train as run_training
+
+    path = run_training(workspaces, output, network_config, config, BarProgress())
+    click.echo(path)
