@@ -40,10 +40,17 @@ def colour(xyz: Matrix) -> FloatMap:
 
 
 def _rays(view: View) -> Matrix:
+    """Rays in the world, by COLMAP's rule itself: no echo of `geometry.pixels`."""
     camera = view.camera
     x, y = np.meshgrid(np.arange(camera.width_px), np.arange(camera.height_px))
-    pixels = np.stack([x, y, np.ones_like(x)], axis=-1).astype(np.float64)
-    in_cam = pixels @ np.linalg.inv(index_K(camera)).T
+    in_cam = np.stack(
+        [
+            (x + 0.5 - camera.cx) / camera.fx,
+            (y + 0.5 - camera.cy) / camera.fy,
+            np.ones_like(x),
+        ],
+        axis=-1,
+    )
     return np.asarray(in_cam @ view.cam_from_world[:, :3])  # row times R: R^T ray
 
 
