@@ -18,7 +18,11 @@ from resdepth_colmap.matching.planes import (
 )
 
 # Without this numba tries TBB first, and warns where it finds an old one.
-numba.config.THREADING_LAYER_PRIORITY = ["omp", "tbb", "workqueue"]
+numba.config.THREADING_LAYER_PRIORITY = [  # type: ignore[attr-defined] # set at run time
+    "omp",
+    "tbb",
+    "workqueue",
+]
 
 NUM_STATES = 9  # eight neighbours and the plane that the pixel has
 NUM_TRIALS = 6  # random and perturbed planes

@@ -261,10 +261,11 @@ class _ImageCache:
         scale = min(1.0, self.max_image_size / max(height, width))
         if 0 < scale < 1.0:
             size = (max(1, round(width * scale)), max(1, round(height * scale)))
-            gray = cv2.resize(gray, size, interpolation=cv2.INTER_AREA)
+            smaller = cv2.resize(gray, size, interpolation=cv2.INTER_AREA)
+            gray = np.asarray(smaller, np.float32)
         camera = view.camera.resized(gray.shape[1], gray.shape[0])
         return MatchView(
-            gray=np.ascontiguousarray(gray, np.float32),
+            gray=gray,
             K=index_K(camera),
             cam_from_world=view.cam_from_world,
         )
