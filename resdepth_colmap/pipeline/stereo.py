@@ -29,6 +29,9 @@ logger = logging.getLogger(__name__)
 
 KIND = "photometric"
 LEDGER_NAME = "resdepth-stereo.json"
+UNFINISHED = ""
+"""In the ledger: the maps of a view are being written, and ours."""
+
 AUTO_SOURCES = 20  # COLMAP's default in patch-match.cfg
 
 
@@ -55,7 +58,8 @@ def choose_backend(
     """Turn `auto` into what this machine and this workspace allow.
 
     Maps that are there win; then COLMAP's own PatchMatch, where pycolmap was built
-    with CUDA; then ours on the CPU.
+    with CUDA; then ours on the CPU. Where all maps are ours, the CPU's work goes on:
+    it may have been interrupted.
 
     Raises:
         WorkspaceError: If existing maps were asked for and there are none.
@@ -82,8 +86,16 @@ def choose_backend(
     if requested is not StereoBackend.AUTO:
         return requested
     if has_maps:
-        return StereoBackend.EXISTING
+        is_ours = _all_ours(workspace, scene)
+        return StereoBackend.CPU if is_ours else StereoBackend.EXISTING
     return StereoBackend.COLMAP if has_cuda else StereoBackend.CPU
+
+
+def _all_ours(workspace: Workspace, scene: Scene) -> bool:
+    ours = _Ledger(workspace).fingerprints
+    return all(
+        view.name in ours for view in scene.views if workspace.original_kinds(view.name)
+    )
 
 
 def stereo_workspace(
@@ -154,6 +166,7 @@ def _run_cpu(
         for index, sources, fingerprint in todo:
             view = scene.views[index]
             result = _match(scene, index, sources, config, images, advance)
+            ledger.add(view.name, UNFINISHED)
             write_depth_map(workspace.depth_map_path(view.name, KIND), result.depth)
             write_normal_map(workspace.normal_map_path(view.name, KIND), result.normals)
             ledger.add(view.name, fingerprint)
