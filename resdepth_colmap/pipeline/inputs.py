@@ -202,12 +202,12 @@ def tile_scaling(stack: InputStack, kind: Normalisation) -> Scaling:
     enough = counts.float().mean(dim=1, keepdim=True) >= LEAST_VALID_SHARE
     values = torch.where(counts | ~enough, values, math.nan)
     if kind is Normalisation.BASELINE:
-        mean = values.nanmean(dim=1)
-        return Scaling(_per_tile(mean), 1.0 / stack.baseline)
+        return Scaling(_per_tile(values.nanmean(dim=1)), 1.0 / stack.baseline)
+    values, device = values.cpu(), values.device  # Apple's GPUs know no quantiles
     levels = values.new_tensor([0.1, 0.5, 0.9])
     low, median, high = torch.nanquantile(values, levels, dim=1)
     spread = torch.maximum(0.5 * (high - low), LEAST_RELATIVE_SPREAD * median)
-    return Scaling(_per_tile(median), _per_tile(spread))
+    return Scaling(_per_tile(median).to(device), _per_tile(spread).to(device))
 
 
 def network_input(stack: InputStack, config: NetworkConfig) -> tuple[Tensor, Scaling]:

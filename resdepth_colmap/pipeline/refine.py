@@ -157,28 +157,32 @@ def _run_tiled(stack: InputStack, network: ResDepthNet, config: RefineConfig) ->
     """
 
     def run_tile(window: Window) -> Tensor:
-        tile = stack.crop(*window)
-        channels, scaling = network_input(tile, network.config)
-        padded = pad_to_multiple(channels, network.config.multiple_px)
-        output = network(padded.contiguous(memory_format=torch.channels_last))
-        refined = output.inverse_depth[..., : window.height_px, : window.width_px]
-        if network.config.residual:
-            change = (refined - channels[:, :1]) * scaling.scale
-        else:
-            change = scaling.restore(refined) - tile.inverse_depth
-        change = torch.nan_to_num(change, nan=0.0, posinf=0.0, neginf=0.0)
-        if output.log_scale is None:
-            return change[0]
-        log_scale = output.log_scale[..., : window.height_px, : window.width_px]
-        log_scale = torch.nan_to_num(log_scale, nan=LOG_SCALE_LIMIT)
-        log_scale = log_scale.clamp(-LOG_SCALE_LIMIT, LOG_SCALE_LIMIT)
-        error = torch.exp(log_scale) * scaling.scale
-        return torch.cat([change, error], dim=1)[0]
+        return _refine_tile(stack.crop(*window), network)[0]
 
     multiple_px = network.config.multiple_px
     tile_px = -(-config.tile_px // multiple_px) * multiple_px
     height_px, width_px = stack.inverse_depth.shape[-2:]
     return apply_tiled(run_tile, (height_px, width_px), tile_px, config.overlap_px)
+
+
+def _refine_tile(tile: InputStack, network: ResDepthNet) -> Tensor:
+    """What `_run_tiled` returns, of one tile of any size, shape (1, 1 or 2, h, w)."""
+    channels, scaling = network_input(tile, network.config)
+    padded = pad_to_multiple(channels, network.config.multiple_px)
+    output = network(padded.contiguous(memory_format=torch.channels_last))
+    height_px, width_px = channels.shape[-2:]
+    refined = output.inverse_depth[..., :height_px, :width_px]
+    if network.config.residual:
+        change = (refined - channels[:, :1]) * scaling.scale
+    else:
+        change = scaling.restore(refined) - tile.inverse_depth
+    change = torch.nan_to_num(change, nan=0.0, posinf=0.0, neginf=0.0)
+    if output.log_scale is None:
+        return change
+    log_scale = output.log_scale[..., :height_px, :width_px]
+    log_scale = torch.nan_to_num(log_scale, nan=LOG_SCALE_LIMIT)
+    log_scale = log_scale.clamp(-LOG_SCALE_LIMIT, LOG_SCALE_LIMIT)
+    return torch.cat([change, torch.exp(log_scale) * scaling.scale], dim=1)
 
 
 def _tensors(view: ViewInputs, device: torch.device) -> ViewTensors:
