@@ -57,7 +57,7 @@ def test_saving_what_was_loaded_gives_the_same_file(file: Path) -> None:
 def test_kernels_are_halved_and_statistics_are_not(file: Path) -> None:
     network = trained()
     network.bottleneck[1].running_var.fill_(1e6)  # type: ignore[operator]
-    network.encoder[0][1].running_var.fill_(1e-12)  # type: ignore[index,operator]
+    network.encoder[0][1].running_var.fill_(1e-12)  # type: ignore[index]
     save_weights(file, network)
     stored = load_file(file)
     assert stored["head.weight"].dtype == torch.float16
