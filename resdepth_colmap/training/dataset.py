@@ -39,6 +39,9 @@ from resdepth_colmap.scene import DepthMap, Scene, View, cam_from_cam
 HOLES_CONSISTENCY = 0.25
 """Photo-consistency above which the copy "with holes" of a map has none."""
 
+LEAST_RIGHT_SHARE = 0.3
+"""A map with fewer pixels within 5 % of the truth is of a failed pair: not used."""
+
 NEAR_TRUTH_WEIGHT = (0.3, 3.0)
 """Range of the weight that turns errors of inverse depth into relative ones."""
 
@@ -133,6 +136,9 @@ def _prepare_workspace(
         if not all(target.exists() for target in targets):
             depth = read_depth_map(workspace.depth_map_path(view.name, kinds[0]))
             truth = read_depth_map(truth_path)
+            right = np.abs(depth - truth) < 0.05 * truth
+            if right.sum() < LEAST_RIGHT_SHARE * max(1, (truth > 0).sum()):
+                continue
             for target in targets:
                 sample = build_sample(workspace, scene, index, depth, truth, config)
                 _write_sample(target, sample)

@@ -66,7 +66,7 @@ def test_a_stopped_training_ends_with_the_same_weights(
                 raise Stop
 
     with pytest.raises(Stop):
-        train([workspace], interrupted, NETWORK, TRAINING, StoppingProgress())  # type: ignore[arg-type] # one object is listener, manager and advance
+        train([workspace], interrupted, NETWORK, TRAINING, StoppingProgress())
     resumed = train([workspace], interrupted, NETWORK, TRAINING)
     first, second = _parameters(whole), _parameters(resumed)
     assert all(torch.equal(first[name], second[name]) for name in first)
