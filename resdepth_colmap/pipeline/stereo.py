@@ -1,14 +1,7 @@
 """Stage "stereo": initial depth and normal maps for the views that have none."""
 
 import dataclasses
-import hashlib
-import json
 import logging
-from collections.abc import Iterable
-from pathlib import Path
-
-import cv2
-import numpy as np
 
 from resdepth_colmap.config import StereoBackend, StereoConfig
 from resdepth_colmap.errors import BackendUnavailableError, WorkspaceError
@@ -16,21 +9,21 @@ from resdepth_colmap.geometry.depth_range import depth_range
 from resdepth_colmap.geometry.pixels import index_K
 from resdepth_colmap.geometry.view_selection import choose_sources
 from resdepth_colmap.io.depth_map import write_depth_map
-from resdepth_colmap.io.images import read_gray
 from resdepth_colmap.io.normal_map import write_normal_map
-from resdepth_colmap.io.output import read_record, write_record
 from resdepth_colmap.io.patch_match_cfg import SourceKind, SourceSpec, read_sources
 from resdepth_colmap.io.workspace import Workspace
 from resdepth_colmap.matching.patch_match import MatchResult, MatchView, match_view
 from resdepth_colmap.pipeline.progress import Advance, Progress, SilentProgress
+from resdepth_colmap.pipeline.stereo_ledger import (
+    KIND,
+    UNFINISHED,
+    StereoLedger,
+    stereo_fingerprint,
+)
+from resdepth_colmap.pipeline.view_images import ViewImages, camera_at_scale
 from resdepth_colmap.scene import Scene, View
 
 logger = logging.getLogger(__name__)
-
-KIND = "photometric"
-LEDGER_NAME = "resdepth-stereo.json"
-UNFINISHED = ""
-"""In the ledger: the maps of a view are being written, and ours."""
 
 AUTO_SOURCES = 20  # COLMAP's default in patch-match.cfg
 
@@ -58,8 +51,7 @@ def choose_backend(
     """Turn `auto` into what this machine and this workspace allow.
 
     Maps that are there win; then COLMAP's own PatchMatch, where pycolmap was built
-    with CUDA; then ours on the CPU. Where all maps are ours, the CPU's work goes on:
-    it may have been interrupted.
+    with CUDA; then ours on the CPU, which also goes on where it was interrupted.
 
     Raises:
         WorkspaceError: If existing maps were asked for and there are none.
@@ -86,16 +78,9 @@ def choose_backend(
     if requested is not StereoBackend.AUTO:
         return requested
     if has_maps:
-        is_ours = _all_ours(workspace, scene)
-        return StereoBackend.CPU if is_ours else StereoBackend.EXISTING
+        goes_on = StereoLedger(workspace).is_unfinished
+        return StereoBackend.CPU if goes_on else StereoBackend.EXISTING
     return StereoBackend.COLMAP if has_cuda else StereoBackend.CPU
-
-
-def _all_ours(workspace: Workspace, scene: Scene) -> bool:
-    ours = _Ledger(workspace).fingerprints
-    return all(
-        view.name in ours for view in scene.views if workspace.original_kinds(view.name)
-    )
 
 
 def stereo_workspace(
@@ -149,11 +134,11 @@ def _run_cpu(
     progress: Progress,
 ) -> StereoReport:
     plans, skipped = plan_sources(workspace, scene, config)
-    ledger = _Ledger(workspace)
+    ledger = StereoLedger(workspace)
     todo, kept = [], []
     for index, sources in plans.items():
         view = scene.views[index]
-        fingerprint = _fingerprint(workspace, scene, index, sources, config)
+        fingerprint = stereo_fingerprint(workspace, scene, index, sources, config)
         if not overwrite and ledger.is_kept(view.name, fingerprint):
             kept.append(view.name)
         else:
@@ -161,7 +146,9 @@ def _run_cpu(
     if todo:
         logger.info("Compiling the matcher: up to a minute, once on a machine.")
     matched = []
-    images = _ImageCache(workspace, config.max_image_size)
+    # A view with its sources, and as many that the next view may share.
+    images = ViewImages(workspace, 2 * (1 + config.max_num_sources))
+    ledger.start()
     with progress.stage("PatchMatch", len(todo)) as advance:
         for index, sources, fingerprint in todo:
             view = scene.views[index]
@@ -171,6 +158,7 @@ def _run_cpu(
             write_normal_map(workspace.normal_map_path(view.name, KIND), result.normals)
             ledger.add(view.name, fingerprint)
             matched.append(view.name)
+    ledger.finish()
     if not matched and not kept:
         raise WorkspaceError(
             f"{workspace.path}: no view could be matched: "
@@ -238,90 +226,33 @@ def _match(
     index: int,
     sources: tuple[int, ...],
     config: StereoConfig,
-    images: "_ImageCache",
+    images: ViewImages,
     advance: Advance,
 ) -> MatchResult:
     near, far = config.depth_min, config.depth_max
     if near <= 0:
         near, far = depth_range(scene, index, sources)
+    reference, *others = (
+        _match_view(scene.views[i], images, config.max_image_size)
+        for i in (index, *sources)
+    )
     return match_view(
-        images.match_view(scene.views[index]),
-        [images.match_view(scene.views[source]) for source in sources],
+        reference,
+        others,
         (near, far),
         config,
         on_sweep=lambda _, total: advance(1.0 / total),
     )
 
 
-class _ImageCache:
-    """Grey images at matching size, the last few of them."""
-
-    def __init__(self, workspace: Workspace, max_image_size: int) -> None:
-        self.workspace = workspace
-        self.max_image_size = max_image_size
-        self.views: dict[str, MatchView] = {}
-
-    def match_view(self, view: View) -> MatchView:
-        if view.name not in self.views:
-            if len(self.views) >= 2 * 16:
-                del self.views[next(iter(self.views))]
-            self.views[view.name] = self._load(view)
-        return self.views[view.name]
-
-    def _load(self, view: View) -> MatchView:
-        gray = read_gray(self.workspace.image_path(view.name))
-        height, width = gray.shape
-        scale = min(1.0, self.max_image_size / max(height, width))
-        if 0 < scale < 1.0:
-            size = (max(1, round(width * scale)), max(1, round(height * scale)))
-            smaller = cv2.resize(gray, size, interpolation=cv2.INTER_AREA)
-            gray = np.asarray(smaller, np.float32)
-        camera = view.camera.resized(gray.shape[1], gray.shape[0])
-        return MatchView(
-            gray=gray,
-            K=index_K(camera),
-            cam_from_world=view.cam_from_world,
-        )
-
-
-class _Ledger:
-    """Which maps are ours, and from what they were made."""
-
-    def __init__(self, workspace: Workspace) -> None:
-        self.workspace = workspace
-        self.path = workspace.stereo_path / LEDGER_NAME
-        self.fingerprints = read_record(self.path) if self.path.exists() else {}
-
-    def is_kept(self, name: str, fingerprint: str) -> bool:
-        """Whether both maps are there, and are others' or ours from the same input."""
-        paths: Iterable[Path] = (
-            self.workspace.depth_map_path(name, KIND),
-            self.workspace.normal_map_path(name, KIND),
-        )
-        depth_path, normal_path = paths
-        if name not in self.fingerprints:
-            return depth_path.exists()
-        there = depth_path.exists() and normal_path.exists()
-        return there and self.fingerprints[name] == fingerprint
-
-    def add(self, name: str, fingerprint: str) -> None:
-        self.fingerprints[name] = fingerprint
-        write_record(self.path, self.fingerprints)
-
-
-def _fingerprint(
-    workspace: Workspace,
-    scene: Scene,
-    index: int,
-    sources: tuple[int, ...],
-    config: StereoConfig,
-) -> str:
-    """A hash of all that the maps of a view are made from."""
-    digest = hashlib.sha256(json.dumps(config.to_mapping(), sort_keys=True).encode())
-    for other in (index, *sources):
-        view = scene.views[other]
-        status = workspace.image_path(view.name).stat()
-        digest.update(f"{view.name} {status.st_size} {status.st_mtime_ns}".encode())
-        digest.update(view.cam_from_world.tobytes())
-        digest.update(repr(view.camera).encode())
-    return digest.hexdigest()
+def _match_view(view: View, images: ViewImages, max_image_size: int) -> MatchView:
+    """What the matcher takes of a view, at matching size."""
+    longest_px = max(view.camera.width_px, view.camera.height_px)
+    is_smaller = 0 < max_image_size < longest_px
+    scale = max_image_size / longest_px if is_smaller else 1.0
+    camera = camera_at_scale(view.camera, scale)
+    return MatchView(
+        gray=images.gray(view, camera),
+        K=index_K(camera),
+        cam_from_world=view.cam_from_world,
+    )
