@@ -12,6 +12,8 @@ import math
 import numpy as np
 from numba import njit
 
+WIDE_RANGE = np.float32(20.0)
+
 
 @njit(cache=True, inline="always")
 def next_random(state):
@@ -36,6 +38,19 @@ def seeded_state(seed, pixel, sweep):
     state *= np.uint64(0x94D049BB133111EB)
     state ^= state >> np.uint64(31)
     return state | np.uint64(1)
+
+
+@njit(cache=True, fastmath=True)
+def inverse_depth_at(share, w_range):
+    """Inverse depth at a share in 0..1 of the range: uniform, as disparity is.
+
+    A range known from the poses alone may span three powers of ten; then it is uniform
+    in the logarithm, or all draws would fall on what is nearest.
+    """
+    low, high = w_range[0], w_range[1]
+    if high > WIDE_RANGE * low:
+        return low * np.float32(math.exp(share * np.float32(math.log(high / low))))
+    return low + share * (high - low)
 
 
 @njit(cache=True, fastmath=True, inline="always")

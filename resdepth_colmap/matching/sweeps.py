@@ -9,6 +9,7 @@ from numba import njit, prange
 from resdepth_colmap.matching.cost import plane_cost, reference_window, weigh_views
 from resdepth_colmap.matching.planes import (
     faces_camera,
+    inverse_depth_at,
     inverse_depth_per_px,
     next_random,
     plane_gradient,
@@ -65,7 +66,7 @@ def start(reference, K, planes, costs, A, b, pixels, starts, sizes, offsets, w_r
             )
             state = seeded_state(seed, y * width + x, 0)
             u, state = next_random(state)
-            w = w_range[0] + u * (w_range[1] - w_range[0])
+            w = inverse_depth_at(u, w_range)
             fx, fy = np.float32(x), np.float32(y)
             gx, gy, state = random_gradient(w, fx, fy, K, state)
             cost = np.float32(0)
@@ -119,7 +120,7 @@ def _make_trials(plane, x, y, K, w_range, w_per_px, state, trials):
     """
     w, gx, gy = plane[0], plane[1], plane[2]
     u, state = next_random(state)
-    w_random = w_range[0] + u * (w_range[1] - w_range[0])
+    w_random = inverse_depth_at(u, w_range)
     gx_random, gy_random, state = random_gradient(w, x, y, K, state)
     nx, ny, nz = plane_normal(w, gx, gy, x, y, K)
     u, state = next_random(state)

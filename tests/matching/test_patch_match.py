@@ -132,3 +132,10 @@ def test_an_empty_depth_range_is_refused(depth_range: tuple[float, float]) -> No
 def test_a_view_without_sources_is_refused() -> None:
     with pytest.raises(ValueError, match="sources"):
         match_view(_view(0.0), [], NEAR_FAR, CONFIG)
+
+
+def test_a_range_of_three_powers_of_ten_still_finds_the_plane() -> None:
+    truth = _depth(_view(0.0).cam_from_world)
+    sources = [_view(0.25), _view(-0.2, 0.1)]
+    result = match_view(_view(0.0), sources, (0.05, 100.0), CONFIG)
+    assert np.median(_inner(np.abs(result.depth - truth) / truth)) < 2e-3
