@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from resdepth_colmap.cli.options import example, workspace_argument
+from resdepth_colmap.cli.options import enum_option, example, workspace_argument
 from resdepth_colmap.pipeline.export_config import REFINED, MapFormat
 
 
@@ -16,13 +16,12 @@ from resdepth_colmap.pipeline.export_config import REFINED, MapFormat
     ),
 )
 @workspace_argument
-@click.option(
+@enum_option(
     "--format",
     "kind",
-    type=click.Choice(MapFormat),
+    kind=MapFormat,
     default=MapFormat.NPY,
-    show_default=True,
-    help="npy: float32; pfm: float32; png16: 16-bit grey, depth = value * "
+    text="npy: float32; pfm: float32; png16: 16-bit grey, depth = value * "
     "unit of depth_scale.json. 0 = no depth in all.",
 )
 @click.option(

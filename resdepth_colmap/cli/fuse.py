@@ -8,6 +8,7 @@ import click
 from resdepth_colmap.cli.options import (
     build_config,
     config_options,
+    enum_option,
     example,
     workspace_argument,
 )
@@ -24,12 +25,11 @@ from resdepth_colmap.pipeline.run_config import CloudFormat, RunConfig
 )
 @workspace_argument
 @config_options(FuseConfig)
-@click.option(
+@enum_option(
     "--cloud-format",
-    type=click.Choice(CloudFormat),
+    kind=CloudFormat,
     default=RunConfig.cloud_format,
-    show_default=True,
-    help="File format of the cloud.",
+    text="File format of the cloud.",
 )
 @click.option(
     "--in-place", is_flag=True, help="Fuse what `refine --in-place` has refined."

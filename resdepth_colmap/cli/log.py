@@ -89,5 +89,7 @@ def _bars() -> "Progress":
         TextColumn("left"),
         TimeRemainingColumn(),
         console=stderr_console(),
-        disable=not (logger.isEnabledFor(logging.INFO)),
+        disable=not (
+            stderr_console().is_terminal and logger.isEnabledFor(logging.INFO)
+        ),
     )

@@ -30,6 +30,21 @@ def example(*lines: str) -> str:
     return f"\b\nExample:\n{shown}"  # \b: click leaves the line breaks
 
 
+def enum_option(
+    *names: str, kind: type[enum.StrEnum], default: enum.StrEnum, text: str
+) -> Callable[[Command], Command]:
+    """An option that takes one of the words of an enumeration."""
+    # click's own Choice of an enumeration takes the names of its members instead.
+    return click.option(
+        *names,
+        type=click.Choice([str(word) for word in kind]),
+        default=str(default),
+        show_default=True,
+        callback=lambda _context, _option, word: kind(word),
+        help=text,
+    )
+
+
 def config_options(
     kind: type[Config], *names: str, skip: tuple[str, ...] = ()
 ) -> Callable[[Command], Command]:
@@ -74,6 +89,9 @@ def _option(field: "dataclasses.Field[Any]", text: str) -> Callable[[Command], C
     if isinstance(field.default, bool):
         flag += f"/--no-{flag[2:]}" if field.default else ""
         return click.option(flag, is_flag=True, default=field.default, help=text)
+    if isinstance(field.default, enum.StrEnum):
+        kind = type(field.default)
+        return enum_option(flag, kind=kind, default=field.default, text=text)
     return click.option(
         flag,
         type=_click_type(field.default),
@@ -84,8 +102,6 @@ def _option(field: "dataclasses.Field[Any]", text: str) -> Callable[[Command], C
 
 
 def _click_type(default: Any) -> Any:
-    if isinstance(default, enum.StrEnum):
-        return click.Choice(type(default))
     if default is None:  # the only options without a value are files
         return click.Path(path_type=Path)
     return type(default)

@@ -8,6 +8,7 @@ import click
 from resdepth_colmap.cli.options import (
     build_config,
     config_options,
+    enum_option,
     example,
     overwrite_option,
     workspace_argument,
@@ -18,7 +19,7 @@ from resdepth_colmap.config import (
     StereoBackend,
     StereoConfig,
 )
-from resdepth_colmap.pipeline.run_config import RunConfig
+from resdepth_colmap.pipeline.run_config import CloudFormat, RunConfig
 
 
 @click.command(
@@ -29,24 +30,22 @@ from resdepth_colmap.pipeline.run_config import RunConfig
     ),
 )
 @workspace_argument
-@click.option(
+@enum_option(
     "--stereo",
     "backend",
-    type=click.Choice(StereoBackend),
+    kind=StereoBackend,
     default=RunConfig.backend,
-    show_default=True,
-    help="Where initial depth comes from: the maps that are there, COLMAP's "
+    text="Where initial depth comes from: the maps that are there, COLMAP's "
     "PatchMatch (needs CUDA), or ours on the CPU; auto takes the first that works.",
 )
 @config_options(RefineConfig)
 @config_options(StereoConfig, "max_image_size")
 @config_options(FuseConfig)
-@click.option(
+@enum_option(
     "--cloud-format",
-    type=click.Choice(type(RunConfig.cloud_format)),
+    kind=CloudFormat,
     default=RunConfig.cloud_format,
-    show_default=True,
-    help="File format of the cloud.",
+    text="File format of the cloud.",
 )
 @click.option("--no-fuse", is_flag=True, help="Stop after the depth maps.")
 @click.option("--no-pictures", is_flag=True, help="Make no pictures of the change.")

@@ -8,6 +8,7 @@ import click
 from resdepth_colmap.cli.options import (
     build_config,
     config_options,
+    enum_option,
     example,
     overwrite_option,
     workspace_argument,
@@ -23,13 +24,12 @@ from resdepth_colmap.config import StereoBackend, StereoConfig
     ),
 )
 @workspace_argument
-@click.option(
+@enum_option(
     "--stereo",
     "backend",
-    type=click.Choice(StereoBackend),
+    kind=StereoBackend,
     default=StereoBackend.CPU,
-    show_default=True,
-    help="Whose PatchMatch: COLMAP's (needs CUDA), or ours on the CPU.",
+    text="Whose PatchMatch: COLMAP's (needs CUDA), or ours on the CPU.",
 )
 @config_options(StereoConfig)
 @overwrite_option

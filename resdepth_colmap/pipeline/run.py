@@ -1,0 +1,211 @@
+"""The whole road: stereo, refine, fuse, pictures, and a record of it all."""
+
+import contextlib
+import dataclasses
+import datetime
+import logging
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from resdepth_colmap.config import Fuser
+from resdepth_colmap.errors import FusionError
+from resdepth_colmap.io.model import read_scene
+from resdepth_colmap.io.output import OutputWorkspace, read_record, write_record
+from resdepth_colmap.io.point_cloud import write_cloud
+from resdepth_colmap.io.workspace import Workspace, check_images, open_workspace
+from resdepth_colmap.network.device import resolve_device
+from resdepth_colmap.network.weights import load_weights
+from resdepth_colmap.pipeline.fuse import count_consistent, fuse_workspace
+from resdepth_colmap.pipeline.fuse_to_file import cloud_path
+from resdepth_colmap.pipeline.pictures import draw_workspace
+from resdepth_colmap.pipeline.progress import Progress, SilentProgress
+from resdepth_colmap.pipeline.refine_workspace import RefineReport, refine_workspace
+from resdepth_colmap.pipeline.run_config import RunConfig
+from resdepth_colmap.pipeline.stereo import StereoReport, stereo_workspace
+from resdepth_colmap.pipeline.versions import peak_memory_mb, versions
+from resdepth_colmap.scene import Scene
+
+logger = logging.getLogger(__name__)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class RunResult:
+    """What a run made.
+
+    Attributes:
+        stereo: The initial depth.
+        refine: The refined maps and where they are.
+        cloud_path: The fused cloud; None without fusion.
+        num_points: Its points.
+        num_points_before: Points that the initial maps give, fused in the same way;
+            None if nobody counted them.
+        overview_path: The picture of the whole workspace; None without pictures.
+    """
+
+    stereo: StereoReport
+    refine: RefineReport
+    cloud_path: Path | None = None
+    num_points: int = 0
+    num_points_before: int | None = None
+    overview_path: Path | None = None
+
+
+def run_refine(
+    path: Path, config: RunConfig | None = None, progress: Progress | None = None
+) -> RunResult:
+    """Refine a workspace: initial depth where there is none, maps, cloud, pictures.
+
+    All of it goes to `resdepth/` in the workspace, with a record in `run.json`. What
+    cannot work is said before the long work starts.
+
+    Args:
+        path: The workspace, or a parent of it.
+        config: Options; None = the defaults.
+        progress: Is told of each stage.
+
+    Raises:
+        WorkspaceError: If the workspace is broken or the result cannot be written.
+        WeightsError: If the weights cannot be read.
+        BackendUnavailableError: If this machine lacks what was asked for.
+        FusionError: If no point survived; maps, pictures and record are there.
+    """
+    config = config or RunConfig()
+    workspace = open_workspace(path)
+    scene = read_scene(workspace.sparse_path, workspace.images_path, workspace.path)
+    check_images(workspace, scene)
+    resolve_device(config.refine.device)
+    load_weights(config.refine.weights)
+    output = OutputWorkspace(source=workspace, in_place=config.in_place)
+    output.prepare([view.name for view in scene.views])
+    return _Run(workspace, scene, config, output, progress or SilentProgress()).run()
+
+
+class _Run:
+    """One run: its stages and its record."""
+
+    def __init__(
+        self,
+        workspace: Workspace,
+        scene: Scene,
+        config: RunConfig,
+        output: OutputWorkspace,
+        progress: Progress,
+    ) -> None:
+        self.workspace = workspace
+        self.scene = scene
+        self.config = config
+        self.output = output
+        self.progress = progress
+        self.seconds: dict[str, float] = {}
+        self.facts: dict[str, Any] = {}
+
+    def run(self) -> RunResult:
+        result = RunResult(stereo=self._stereo(), refine=self._refine())
+        failure: FusionError | None = None
+        if not self.config.no_fuse:
+            try:
+                result = self._fuse(result)
+            except FusionError as error:  # the maps are good: go on, then say it
+                failure = error
+                self.facts["fuse"] = {"error": str(error)}
+        if not self.config.no_pictures:
+            result = self._draw(result)
+        self._write_record(result)
+        if failure is not None:
+            raise failure
+        return result
+
+    def _stereo(self) -> StereoReport:
+        with self._timed("stereo"):
+            return stereo_workspace(
+                self.workspace,
+                self.scene,
+                self.config.stereo,
+                self.config.backend,
+                progress=self.progress,
+            )
+
+    def _refine(self) -> RefineReport:
+        with self._timed("refine"):
+            return refine_workspace(
+                self.workspace,
+                self.config.refine,
+                scene=self.scene,
+                in_place=self.config.in_place,
+                overwrite=self.config.overwrite,
+                progress=self.progress,
+            )
+
+    def _fuse(self, result: RunResult) -> RunResult:
+        path = cloud_path(self.output, self.config.cloud_format)
+        with self._timed("fuse"):
+            fused = fuse_workspace(
+                self.output, self.scene, self.config.fuse, self.progress
+            )
+            write_cloud(path, fused.cloud)
+        num_before = None
+        # COLMAP's fusion keeps no account that could be compared.
+        if self.config.fuse.fuser is Fuser.OPEN3D:
+            num_before = self._count_before(result.refine)
+        self.facts["fuse"] = {
+            "points": len(fused.cloud),
+            "points_before_refinement": num_before,
+            "thinned": fused.num_thinned,
+            "outliers": fused.num_outliers,
+            **dataclasses.asdict(fused.statistics),
+        }
+        return dataclasses.replace(
+            result,
+            cloud_path=path,
+            num_points=len(fused.cloud),
+            num_points_before=num_before,
+        )
+
+    def _count_before(self, refine: RefineReport) -> int:
+        kinds = {name: record["input"] for name, record in refine.images.items()}
+        with self._timed("fuse_before"):
+            statistics = count_consistent(
+                self.workspace, self.scene, kinds, self.config.fuse, self.progress
+            )
+        return statistics.num_points
+
+    def _draw(self, result: RunResult) -> RunResult:
+        with self._timed("pictures"):
+            path = draw_workspace(self.output, self.scene, result.refine, self.progress)
+        return dataclasses.replace(result, overview_path=path)
+
+    def _write_record(self, result: RunResult) -> None:
+        stereo, refine = result.stereo, result.refine
+        memory_mb = peak_memory_mb()
+        record = {
+            "finished": datetime.datetime.now(datetime.UTC).isoformat("T", "seconds"),
+            "workspace": self.workspace.path,
+            "options": self.config.to_mapping(),
+            "versions": versions(),
+            **refine.facts,
+            "seconds": {name: round(value, 3) for name, value in self.seconds.items()},
+            "peak_memory_mb": None if memory_mb is None else round(memory_mb),
+            "stereo": {
+                "backend": stereo.backend,
+                "matched": stereo.matched,
+                "kept": stereo.kept,
+                "skipped": dict(stereo.skipped),
+            },
+            "refined": refine.refined,
+            "kept": refine.kept,
+            "skipped": dict(refine.skipped),
+            **self.facts,
+        }
+        path = self.output.record_path
+        # The images' own part was written by the refinement, one by one.
+        write_record(path, {**record, "images": read_record(path).get("images", {})})
+
+    @contextlib.contextmanager
+    def _timed(self, stage: str) -> Iterator[None]:
+        start = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.seconds[stage] = time.perf_counter() - start
