@@ -1,0 +1,104 @@
+"""Run `resdepth-colmap refine` on the real workspaces, as a user would, and keep score.
+
+    python scripts/bench_workspaces.py --output /somewhere [--only plant-geometric ...]
+
+Each run starts from a fresh copy below --output (links where possible), where its
+pictures and cloud can be looked at afterwards. `castle_photos` starts from the photos:
+structure from motion and undistortion by pycolmap first. The figures go to
+docs/measurements/workspaces.json.
+"""
+
+import argparse
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+REPOSITORY = Path(__file__).resolve().parents[1]
+RESULT = REPOSITORY / "docs" / "measurements" / "workspaces.json"
+CASES: dict[str, tuple[str, list[str]]] = {
+    "meeting_room": ("meeting_room", []),
+    "plant-photometric": ("plant", ["--input", "photometric"]),
+    "plant-geometric": ("plant", ["--input", "geometric"]),
+    "walnut": ("walnut", ["--stereo", "cpu"]),
+    "castle_photos": ("castle_photos", ["--max-image-size", "1000"]),
+}
+
+
+def reconstruct(photos: Path, workspace: Path) -> float:
+    """From photos to a dense workspace, by pycolmap; returns the seconds it took."""
+    import pycolmap
+
+    start = time.perf_counter()
+    workspace.mkdir(parents=True)
+    database = workspace / "database.db"
+    pycolmap.extract_features(database, photos)
+    pycolmap.match_exhaustive(database)
+    models = pycolmap.incremental_mapping(database, photos, workspace / "sfm")
+    largest = max(models, key=lambda index: models[index].num_reg_images())
+    pycolmap.undistort_images(
+        workspace / "dense", workspace / "sfm" / str(largest), photos
+    )
+    return time.perf_counter() - start
+
+
+def prepare(case: str, data: Path, output: Path) -> tuple[Path, float]:
+    """A fresh copy of the workspace, and the seconds of structure from motion."""
+    source, target = data / CASES[case][0], output / case
+    shutil.rmtree(target, ignore_errors=True)
+    if (source / "sparse").is_dir():
+        shutil.copytree(source, target)
+        return target, 0.0
+    return target / "dense", reconstruct(source, target)
+
+
+def measure(case: str, data: Path, output: Path) -> dict[str, Any]:
+    """Run the command on the case and collect what its record says."""
+    workspace, sfm_s = prepare(case, data, output)
+    command = [Path(sys.executable).parent / "resdepth-colmap", "refine", workspace]
+    start = time.perf_counter()
+    subprocess.run([*command, *CASES[case][1]], check=True)
+    wall_s = time.perf_counter() - start
+    record = json.loads((workspace / "resdepth" / "run.json").read_text("utf-8"))
+    images = record["images"].values()
+    return {
+        "options": CASES[case][1],
+        "num_images": len(images),
+        "seconds": {"structure_from_motion": round(sfm_s, 1), **record["seconds"]},
+        "seconds_in_all": round(wall_s, 1),
+        "peak_memory_mb": record["peak_memory_mb"],
+        "points_before": record["fuse"]["points_before_refinement"],
+        "points_after": record["fuse"]["points"],
+        "filled_before": _mean([image["filled_before"] for image in images]),
+        "filled_after": _mean([image["filled_after"] for image in images]),
+    }
+
+
+def _mean(values: list[float]) -> float:
+    return round(sum(values) / len(values), 4)
+
+
+def main() -> None:
+    """Read the command line and measure case by case."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    default = REPOSITORY.parent / "shared" / "data"
+    parser.add_argument(
+        "--data", type=Path, default=os.environ.get("RESDEPTH_DATA", default)
+    )
+    parser.add_argument("--output", type=Path, default=REPOSITORY / "build" / "bench")
+    parser.add_argument("--only", nargs="*", choices=CASES, default=list(CASES))
+    arguments = parser.parse_args()
+    for case in arguments.only:
+        results = json.loads(RESULT.read_text("utf-8")) if RESULT.exists() else {}
+        results[case] = measure(case, Path(arguments.data), arguments.output)
+        RESULT.parent.mkdir(parents=True, exist_ok=True)
+        RESULT.write_text(json.dumps(results, indent=2) + "\n", "utf-8")
+        print(case, json.dumps(results[case]))
+
+
+if __name__ == "__main__":
+    main()
