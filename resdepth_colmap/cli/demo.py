@@ -5,14 +5,15 @@ from typing import Any
 
 import click
 
-from resdepth_colmap.cli.options import build_config, config_options, example
+from resdepth_colmap.cli.options import build_config, command, config_options
 from resdepth_colmap.config import StereoBackend, SynthesisConfig
 from resdepth_colmap.pipeline.run_config import RunConfig
 
 
-@click.command(
-    short_help="Render a small room, refine it, show the error before and after.",
-    epilog=example("demo", "demo --output somewhere/ --num-views 3"),
+@command(
+    "Render a small room, refine it, show the error before and after.",
+    "demo",
+    "demo --output somewhere/ --num-views 3",
 )
 @click.option(
     "--output",

@@ -4,16 +4,14 @@ from pathlib import Path
 
 import click
 
-from resdepth_colmap.cli.options import enum_option, example, workspace_argument
+from resdepth_colmap.cli.options import command, enum_option, workspace_argument
 from resdepth_colmap.pipeline.export_config import REFINED, MapFormat
 
 
-@click.command(
-    short_help="Write depth maps as NPY, PFM or 16-bit PNG.",
-    epilog=example(
-        "export scene/dense --format pfm --output depth/",
-        "export scene/dense --format png16 --maps photometric --output depth/",
-    ),
+@command(
+    "Write depth maps as NPY, PFM or 16-bit PNG.",
+    "export scene/dense --format pfm --output depth/",
+    "export scene/dense --format png16 --maps photometric --output depth/",
 )
 @workspace_argument
 @enum_option(

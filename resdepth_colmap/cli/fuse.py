@@ -7,21 +7,19 @@ import click
 
 from resdepth_colmap.cli.options import (
     build_config,
+    command,
     config_options,
     enum_option,
-    example,
     workspace_argument,
 )
 from resdepth_colmap.config import FuseConfig
 from resdepth_colmap.pipeline.run_config import CloudFormat, RunConfig
 
 
-@click.command(
-    short_help="Fuse refined maps into a cloud.",
-    epilog=example(
-        "fuse scene/dense",
-        "fuse scene/dense --min-num-views 2 --voxel-size 0.01 --cloud-format pcd",
-    ),
+@command(
+    "Fuse refined maps into a cloud.",
+    "fuse scene/dense",
+    "fuse scene/dense --min-num-views 2 --voxel-size 0.01 --cloud-format pcd",
 )
 @workspace_argument
 @config_options(FuseConfig)

@@ -8,16 +8,17 @@ import click
 
 from resdepth_colmap.cli.options import (
     build_config,
+    command,
     config_options,
-    example,
     workspace_argument,
 )
 from resdepth_colmap.config import RefineConfig, StereoConfig
 
 
-@click.command(
-    short_help="Say what a workspace holds and what refine would do.",
-    epilog=example("info scene/dense", "info scene/dense --json"),
+@command(
+    "Say what a workspace holds and what refine would do.",
+    "info scene/dense",
+    "info scene/dense --json",
 )
 @workspace_argument
 @config_options(RefineConfig, "input", "passes")

@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from resdepth_colmap.cli.options import example
+from resdepth_colmap.cli.options import example, verbosity_options
 from resdepth_colmap.errors import ResDepthError
 
 INTERRUPTED = 130  # the shell's code for a program that Ctrl-C ended
@@ -61,11 +61,7 @@ def _plain_name(token: str) -> str:
         "token_normalize_func": _plain_name,
     },
 )
-@click.option("-v", "--verbose", count=True, help="Say more; twice: say everything.")
-@click.option("-q", "--quiet", count=True, help="Warnings only; twice: errors only.")
+@verbosity_options
 @click.version_option(package_name="resdepth-colmap", prog_name="resdepth-colmap")
-def main(verbose: int, quiet: int) -> None:
+def main() -> None:
     """Makes the depth maps of a COLMAP workspace right, on any machine."""
-    from resdepth_colmap.cli.log import start_log
-
-    start_log(verbose - quiet)

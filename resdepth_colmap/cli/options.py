@@ -30,6 +30,50 @@ def example(*lines: str) -> str:
     return f"\b\nExample:\n{shown}"  # \b: click leaves the line breaks
 
 
+def command(short_help: str, *lines: str) -> Callable[[Command], click.Command]:
+    """Make a command of a function: with examples, and with -v and -q of its own.
+
+    Args:
+        short_help: Its line in the list of commands.
+        lines: Examples, without the name of the program.
+    """
+
+    def decorate(function: Command) -> click.Command:
+        make = click.command(short_help=short_help, epilog=example(*lines))
+        return make(verbosity_options(function))
+
+    return decorate
+
+
+def verbosity_options(function: Command) -> Command:
+    """Give a command -v and -q, before or after its name."""
+    louder = click.option(
+        "-v",
+        "--verbose",
+        count=True,
+        expose_value=False,
+        callback=lambda context, _option, count: _log_more(context, count),
+        help="Say more; twice: say everything.",
+    )
+    quieter = click.option(
+        "-q",
+        "--quiet",
+        count=True,
+        expose_value=False,
+        callback=lambda context, _option, count: _log_more(context, -count),
+        help="Warnings only; twice: errors only.",
+    )
+    return louder(quieter(function))
+
+
+def _log_more(context: click.Context, change: int) -> None:
+    from resdepth_colmap.cli.log import start_log
+
+    root = context.find_root()
+    root.obj = (root.obj or 0) + change
+    start_log(root.obj)
+
+
 def enum_option(
     *names: str, kind: type[enum.StrEnum], default: enum.StrEnum, text: str
 ) -> Callable[[Command], Command]:

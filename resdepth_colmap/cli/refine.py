@@ -7,9 +7,9 @@ import click
 
 from resdepth_colmap.cli.options import (
     build_config,
+    command,
     config_options,
     enum_option,
-    example,
     overwrite_option,
     workspace_argument,
 )
@@ -22,12 +22,10 @@ from resdepth_colmap.config import (
 from resdepth_colmap.pipeline.run_config import CloudFormat, RunConfig
 
 
-@click.command(
-    short_help="Refine depth maps, fuse them, show what changed.",
-    epilog=example(
-        "refine scene/dense",
-        "refine scene/dense --stereo cpu --max-image-size 1000 --passes 2",
-    ),
+@command(
+    "Refine depth maps, fuse them, show what changed.",
+    "refine scene/dense",
+    "refine scene/dense --stereo cpu --max-image-size 1000 --passes 2",
 )
 @workspace_argument
 @enum_option(

@@ -61,7 +61,8 @@ def show_run(result: "RunResult") -> None:
 
 def show_inspection(found: "Inspection") -> None:
     """What `info` found, for people."""
-    sizes = ", ".join(f"{n} of {w} x {h}" for w, h, n in found.image_sizes)
+    first, *_, last = [f"{w} x {h}" for w, h, _ in found.image_sizes] * 2
+    sizes = first if len(found.image_sizes) == 1 else f"{first} to {last}"
     show_line("workspace", found.path)
     show_line("images", f"{found.num_views} ({sizes} px)")
     show_line("missing images", len(found.missing_images))

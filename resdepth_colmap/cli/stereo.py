@@ -7,21 +7,19 @@ import click
 
 from resdepth_colmap.cli.options import (
     build_config,
+    command,
     config_options,
     enum_option,
-    example,
     overwrite_option,
     workspace_argument,
 )
 from resdepth_colmap.config import StereoBackend, StereoConfig
 
 
-@click.command(
-    short_help="Make initial depth maps by PatchMatch.",
-    epilog=example(
-        "stereo scene/dense --max-image-size 1000",
-        "stereo scene/dense --PatchMatchStereo.window_radius 7",
-    ),
+@command(
+    "Make initial depth maps by PatchMatch.",
+    "stereo scene/dense --max-image-size 1000",
+    "stereo scene/dense --PatchMatchStereo.window_radius 7",
 )
 @workspace_argument
 @enum_option(

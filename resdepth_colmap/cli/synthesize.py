@@ -5,13 +5,13 @@ from typing import Any
 
 import click
 
-from resdepth_colmap.cli.options import build_config, config_options, example
+from resdepth_colmap.cli.options import build_config, command, config_options
 from resdepth_colmap.config import SynthesisConfig
 
 
-@click.command(
-    short_help="Render rooms with known depth, to train on.",
-    epilog=example("synthesize rooms/ --num-scenes 20 --num-views 2 --workers 2"),
+@command(
+    "Render rooms with known depth, to train on.",
+    "synthesize rooms/ --num-scenes 20 --num-views 2 --workers 2",
 )
 @click.argument("output", type=click.Path(path_type=Path, file_okay=False))
 @config_options(SynthesisConfig)

@@ -5,17 +5,15 @@ from typing import Any
 
 import click
 
-from resdepth_colmap.cli.options import build_config, config_options, example
+from resdepth_colmap.cli.options import build_config, command, config_options
 from resdepth_colmap.config import NetworkConfig, TrainConfig
 
 
-@click.command(
-    short_help="Train a network on workspaces with known depth.",
-    epilog=example(
-        "synthesize rooms/ --num-scenes 100 --num-views 3",
-        "stereo rooms/room_000000",
-        "train rooms/room_* --output training/",
-    ),
+@command(
+    "Train a network on workspaces with known depth.",
+    "synthesize rooms/ --num-scenes 100 --num-views 3",
+    "stereo rooms/room_000000",
+    "train rooms/room_* --output training/",
 )
 @click.argument(
     "workspaces",

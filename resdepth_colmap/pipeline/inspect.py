@@ -234,8 +234,8 @@ def _warnings(found: Inspection) -> list[str]:
         warnings.append("one image only: no second view to compare with")
     if found.num_points == 0:
         warnings.append(
-            "no sparse points: views are paired by pose, depth ranges are guessed, and "
-            "COLMAP's own fusion gives no points (its pycolmap needs min_num_pixels=1)"
+            "no sparse points: views are paired and depth ranges are guessed by pose, "
+            "and COLMAP's own fusion gives no point (--fuser open3d does)"
         )
     if found.maps and 0 < found.num_refined < found.num_views:
         without = found.num_views - found.num_refined

@@ -1,5 +1,6 @@
 """Stage "refine": a loop over the views of a workspace round `refine_view`."""
 
+import collections
 import dataclasses
 import logging
 import time
@@ -34,6 +35,8 @@ from resdepth_colmap.pipeline.view_images import ViewImages, camera_at_scale
 from resdepth_colmap.scene import DepthMap, Scene, View, cam_from_cam
 
 logger = logging.getLogger(__name__)
+
+MOST_NAMES_SHOWN = 3
 
 RECORD_KEY = "images"
 """Where run.json holds what is known of each refined image."""
@@ -115,8 +118,7 @@ def refine_workspace(
     output.prepare([view.name for view in scene.views])
     loop = _Loop(workspace, scene, config, network, output)
     refined, kept, empty = loop.run(plans, overwrite, progress)
-    for name, reason in (*skipped, *empty):
-        logger.warning("%s is skipped: %s.", name, reason)
+    _say_skipped((*skipped, *empty))
     _check_any(workspace, refined + kept, (*skipped, *empty))
     return RefineReport(
         output=output,
@@ -268,6 +270,22 @@ def _check_num_views(workspace: Workspace, scene: Scene, config: NetworkConfig) 
         raise WorkspaceError(
             f"{workspace.sparse_path}: the model has a single image, but refinement "
             "compares each image with a second one; add images of the same scene."
+        )
+
+
+def _say_skipped(skipped: Skipped) -> None:
+    names_by_reason = collections.defaultdict(list)
+    for name, reason in skipped:
+        names_by_reason[reason].append(name)
+    for reason, names in names_by_reason.items():
+        shown = ", ".join(names[:MOST_NAMES_SHOWN])
+        more = len(names) - MOST_NAMES_SHOWN
+        logger.warning(
+            "%d skipped, %s: %s%s (run.json has them all).",
+            len(names),
+            reason,
+            shown,
+            f" and {more} more" if more > 0 else "",
         )
 
 

@@ -136,7 +136,7 @@ def test_info_is_a_table_or_json(tmp_path: Path) -> None:
     folder = plane_folder(tmp_path)
     text = run("info", folder).stdout
     assert "geometric" in text
-    assert "5 of 80 x 60 px" in text
+    assert "5 (80 x 60 px)" in text
     facts = json.loads(run("info", folder, "--json").stdout)
     assert facts["num_views"] == 5
     assert not (folder / "resdepth").exists()
@@ -146,12 +146,19 @@ def test_the_log_is_not_on_stdout(tmp_path: Path) -> None:
     folder = plane_folder(tmp_path)
     (folder / f"stereo/depth_maps/{NAMES[0]}.geometric.bin").unlink()
     result = refine(folder, "--no-fuse", "--no-pictures")
-    assert "is skipped" in result.stderr
-    assert "is skipped" not in result.stdout
-    quiet = CliRunner().invoke(
-        main, ["-qq", "info", str(folder)], catch_exceptions=False
-    )
-    assert quiet.stderr == ""
+    assert "1 skipped, no depth map" in result.stderr
+    assert "skipped, no depth map" not in result.stdout
+
+
+def test_quiet_stands_before_or_after_the_command(tmp_path: Path) -> None:
+    folder = plane_folder(tmp_path)
+    (folder / f"stereo/depth_maps/{NAMES[0]}.geometric.bin").unlink()
+    weights = identity_weights(tmp_path)
+    rest = (folder, "--weights", weights, "--no-fuse", "--no-pictures", "--overwrite")
+    assert run("refine", *rest).stderr
+    assert run("-qq", "refine", *rest).stderr == ""
+    assert run("refine", *rest, "-qq").stderr == ""
+    assert run("-q", "refine", *rest, "-q").stderr == ""
 
 
 def test_stereo_keeps_maps_that_are_there(tmp_path: Path) -> None:
@@ -174,7 +181,7 @@ def test_train_passes_its_options_on(
         return tmp_path / "weights.safetensors"
 
     loop = types.SimpleNamespace(train=fake)
-    monkeypatch.setitem(sys.modules, "resdepth_colmap.training.loop", loop)  # type: ignore[arg-type] # a stand-in
+    monkeypatch.setitem(sys.modules, "resdepth_colmap.training.loop", loop)
     result = run(
         "train",
         tmp_path,
