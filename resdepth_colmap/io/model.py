@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pycolmap
 
 from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.io.files import safe_name
-from resdepth_colmap.io.model_file import check_model_files
+from resdepth_colmap.io.model_file import check_model_files, find_model, names_in_text
 from resdepth_colmap.scene import Camera, Matrix, Scene, View
 
 _PINHOLES = ("PINHOLE", "SIMPLE_PINHOLE")
@@ -43,38 +44,48 @@ def read_scene(sparse_path: Path, images_path: Path, workspace_path: Path) -> Sc
     with _quiet_pycolmap():
         try:
             model = pycolmap.Reconstruction(sparse_path)
-            images = [model.images[index] for index in sorted(model.reg_image_ids())]
-            names = [safe_name(image.name) for image in images]
-        except WorkspaceError as error:
-            raise WorkspaceError(f"{sparse_path}: {error}") from error
-        except _PYCOLMAP_ERRORS as error:
-            raise _broken(sparse_path, error) from error
-        _check_images(sparse_path, names)
-        _check_cameras(sparse_path, images_path, images)
-        views = tuple(_view(sparse_path, image) for image in images)
-        num_points = model.num_points3D()
-        if num_points == 0:
-            return Scene(views=views)
-        try:
+            views = _views(sparse_path, images_path, model)
+            num_points = model.num_points3D()
+            if num_points == 0:
+                return Scene(views=views)
             mvs_model = pycolmap.MVSModel()
             mvs_model.read_from_colmap(
                 workspace_path.absolute(),
                 sparse_path.absolute(),
                 images_path.absolute(),
             )
-            return _scene_with_points(views, num_points, mvs_model)
+            order = np.argsort(model.reg_image_ids())  # MVSModel has them as they come
+            return _scene_with_points(views, num_points, mvs_model, order)
+        except WorkspaceError:
+            raise
         except _PYCOLMAP_ERRORS as error:
             raise _broken(sparse_path, error) from error
 
 
+def _views(sparse_path: Path, images_path: Path, model: Any) -> tuple[View, ...]:
+    """The images that have a pose, image ids ascending."""
+    images = [model.images[image_id] for image_id in sorted(model.reg_image_ids())]
+    if find_model(sparse_path) == ".txt":
+        whole_names = names_in_text(sparse_path)
+        names = [whole_names.get(image.image_id, image.name) for image in images]
+    else:
+        names = [image.name for image in images]
+    _check_names(sparse_path, names)
+    _check_cameras(sparse_path, images_path, images)
+    pairs = zip(images, names, strict=True)
+    return tuple(_view(sparse_path, image, name) for image, name in pairs)
+
+
 def _scene_with_points(
-    views: tuple[View, ...], num_points: int, mvs_model: Any
+    views: tuple[View, ...],
+    num_points: int,
+    mvs_model: Any,
+    order: npt.NDArray[np.int64],
 ) -> Scene:
     depth_range = np.array(mvs_model.compute_depth_ranges(), dtype=np.float64)
     has_points = depth_range[:, 1] > 0  # COLMAP says (-1, -1) where there are none
     if not has_points.any():  # points without tracks say nothing of the views
         return Scene(views=views, num_points=num_points)
-    order = _order(views, mvs_model)
     shared = _square(mvs_model.compute_shared_points())
     angles = _square(mvs_model.compute_triangulation_angles(_ANGLE_PERCENTILE))
     depth_range[~has_points] = 0
@@ -87,12 +98,6 @@ def _scene_with_points(
     )
 
 
-def _order(views: tuple[View, ...], mvs_model: Any) -> list[int]:
-    """Where each view stands in the MVSModel: the same place, but do not rely on it."""
-    order = {mvs_model.get_image_name(index): index for index in range(len(views))}
-    return [order[view.name] for view in views]
-
-
 def _square(rows: list[dict[int, float]]) -> Matrix:
     """A symmetric matrix of what COLMAP says of each pair of images; 0 elsewhere."""
     matrix = np.zeros((len(rows), len(rows)), dtype=np.float64)
@@ -102,7 +107,7 @@ def _square(rows: list[dict[int, float]]) -> Matrix:
     return matrix
 
 
-def _view(sparse_path: Path, image: Any) -> View:
+def _view(sparse_path: Path, image: Any, name: str) -> View:
     camera = image.camera
     K = camera.calibration_matrix()
     pose = np.array(image.cam_from_world().matrix(), dtype=np.float64)
@@ -110,13 +115,13 @@ def _view(sparse_path: Path, image: Any) -> View:
     is_rotation = np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-3)
     if not (is_rotation and np.isfinite(pose).all() and _is_camera(camera, K)):
         raise WorkspaceError(
-            f"{sparse_path}: the pose or camera {image.camera_id} of {image.name} is "
+            f"{sparse_path}: the pose or camera {image.camera_id} of {name} is "
             "not one (not finite, no rotation or no positive size); "
             "run the reconstruction again."
         )
     return View(
         image_id=int(image.image_id),
-        name=image.name,
+        name=name,
         camera=Camera(
             width_px=int(camera.width),
             height_px=int(camera.height),
@@ -134,12 +139,17 @@ def _is_camera(camera: Any, K: Matrix) -> bool:
     return bool(np.isfinite(K).all()) and min(sizes) > 0
 
 
-def _check_images(sparse_path: Path, names: list[str]) -> None:
+def _check_names(sparse_path: Path, names: list[str]) -> None:
     if not names:
         raise WorkspaceError(
             f"{sparse_path}: the model is empty (no image with a pose); "
             "point at a workspace whose reconstruction succeeded."
         )
+    for name in names:
+        try:
+            safe_name(name)
+        except WorkspaceError as error:
+            raise WorkspaceError(f"{sparse_path}: {error}") from error
     repeated = sorted(name for name, count in Counter(names).items() if count > 1)
     if repeated:
         raise WorkspaceError(

@@ -47,6 +47,29 @@ def check_model_files(folder: Path) -> None:
             _walk(folder / f"{part}.bin", step)
 
 
+def names_in_text(folder: Path) -> dict[int, str]:
+    """The whole image names of a text model, by image id.
+
+    COLMAP writes names with blanks into `images.txt`, but reads them only up to the
+    first one.
+
+    Raises:
+        WorkspaceError: If the file is no text in UTF-8.
+    """
+    path = folder / "images.txt"
+    try:
+        lines = iter(path.read_text(encoding="utf-8").split("\n"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise WorkspaceError(f"{path}: cannot be read as text in UTF-8.") from error
+    names = {}
+    for line in lines:
+        fields = line.strip().split(maxsplit=9)
+        if len(fields) == 10 and fields[0].isdecimal():
+            names[int(fields[0])] = fields[9]
+            next(lines, None)  # the points of the image
+    return names
+
+
 def _walk(path: Path, step: Callable[[bytes, int], int]) -> None:
     try:
         data = path.read_bytes()

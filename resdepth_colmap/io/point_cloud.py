@@ -1,0 +1,140 @@
+"""Point clouds in files that other programs read: PLY, PCD, XYZ.
+
+All through open3d's tensor interface: it writes the coordinates as float32. (The
+legacy one writes doubles, which PCL, and so ETH3D's program, reads as zeros.)
+"""
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from resdepth_colmap.errors import ConfigError, FusionError, WorkspaceError
+from resdepth_colmap.io.files import whole_file
+
+CLOUD_SUFFIXES = (".ply", ".pcd", ".xyz")
+"""Extensions that `write_cloud` knows; .xyz holds coordinates alone."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
+class PointCloud:
+    """Points with colours and normals.
+
+    Attributes:
+        points: Coordinates in the world frame, in workspace units, shape (N, 3),
+            float32.
+        colors: RGB values, shape (N, 3), uint8.
+        normals: Unit normals in the world frame, shape (N, 3), float32; (0, 0, 0) =
+            none.
+    """
+
+    points: npt.NDArray[np.float32]
+    colors: npt.NDArray[np.uint8]
+    normals: npt.NDArray[np.float32]
+
+    def __post_init__(self) -> None:
+        """Check the shapes once, so that no later code has to."""
+        expected = (len(self.points), 3)
+        for field in dataclasses.fields(self):
+            shape = getattr(self, field.name).shape
+            if shape != expected:
+                raise ValueError(f"{field.name}: {shape=} but expected {expected}.")
+
+    def __len__(self) -> int:
+        """The number of points."""
+        return len(self.points)
+
+
+def check_cloud_path(path: Path) -> None:
+    """Check that a cloud can be written in the format of a path's extension.
+
+    Raises:
+        ConfigError: If the extension is none of CLOUD_SUFFIXES.
+    """
+    if path.suffix.lower() not in CLOUD_SUFFIXES:
+        known = ", ".join(CLOUD_SUFFIXES)
+        raise ConfigError(
+            f"{path}: clouds cannot be written as {path.suffix!r}; known are: {known}."
+        )
+
+
+def write_cloud(path: Path, cloud: PointCloud) -> None:
+    """Write a cloud, whole or not at all, in the format of the path's extension.
+
+    Args:
+        path: A .ply or .pcd (binary, float32 coordinates, colours, normals) or .xyz
+            (text, coordinates alone).
+        cloud: The points; at least one.
+
+    Raises:
+        ConfigError: If the extension is none of these.
+        FusionError: If the cloud is empty.
+        WorkspaceError: If the file cannot be written.
+    """
+    check_cloud_path(path)
+    if len(cloud) == 0:
+        raise FusionError(
+            f"{path}: no point to write; ask fewer views to agree (--min-num-views), "
+            "allow larger errors (--max-depth-error, --max-reproj-error), or refine "
+            "more images."
+        )
+    import open3d  # slow import
+
+    tensor_cloud = open3d.t.geometry.PointCloud(_tensor(cloud.points, np.float32))
+    tensor_cloud.point.colors = _tensor(cloud.colors, np.uint8)
+    tensor_cloud.point.normals = _tensor(cloud.normals, np.float32)
+    with whole_file(path) as partial:
+        with _quiet_open3d():
+            is_written = open3d.t.io.write_point_cloud(partial, tensor_cloud)
+        if not is_written:
+            raise WorkspaceError(
+                f"{path}: cannot write the cloud; check the permissions of its folder "
+                "and the free space of the disk."
+            )
+
+
+def read_cloud(path: Path) -> PointCloud:
+    """Read a PLY file.
+
+    Args:
+        path: A .ply, text or binary, float or double.
+
+    Returns:
+        Its points; colours and normals are 0 where the file has none.
+
+    Raises:
+        ConfigError: If it is no .ply.
+        WorkspaceError: If the file is not there, broken or without a point.
+    """
+    if path.suffix.lower() != ".ply":
+        raise ConfigError(f"{path}: clouds are read from .ply, not {path.suffix!r}.")
+    if not path.is_file():
+        raise WorkspaceError(f"{path}: no such file.")
+    import open3d  # slow import
+
+    with _quiet_open3d():
+        tensor_cloud = open3d.t.io.read_point_cloud(path)
+    values = {key: value.numpy() for key, value in tensor_cloud.point.items()}
+    if len(values.get("positions", ())) == 0:
+        raise WorkspaceError(f"{path}: no PLY file, broken, or without a point.")
+    none = np.zeros_like(values["positions"])
+    return PointCloud(
+        points=values["positions"].astype(np.float32),
+        colors=values.get("colors", none).astype(np.uint8),
+        normals=values.get("normals", none).astype(np.float32),
+    )
+
+
+def _tensor(values: npt.NDArray[Any], dtype: npt.DTypeLike) -> Any:
+    import open3d  # slow import
+
+    return open3d.core.Tensor.from_numpy(np.ascontiguousarray(values, dtype=dtype))
+
+
+def _quiet_open3d() -> Any:
+    """open3d's warnings off the terminal: what matters is raised."""
+    import open3d  # slow import
+
+    return open3d.utility.VerbosityContextManager(open3d.utility.VerbosityLevel.Error)
