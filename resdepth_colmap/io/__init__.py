@@ -1,1 +1,3 @@
 """Files: workspaces, models, maps, images, clouds. No torch."""
+
+import zlib  # noqa: F401 - has to be loaded before pycolmap: see png.py

@@ -1,6 +1,6 @@
 """Photos, read as grey or colour values, and PNG files written.
 
-PNG is never written through cv2: after `import pycolmap`, cv2 5.0 aborts the process.
+PNG is only ever written through `io/png.py`: after `import pycolmap`, others may abort.
 An EXIF orientation is not applied, because COLMAP's cameras do not apply it either.
 """
 
@@ -15,7 +15,8 @@ import numpy.typing as npt
 from PIL import Image, UnidentifiedImageError
 
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.io.files import whole_file
+from resdepth_colmap.io.files import write_whole
+from resdepth_colmap.io.png import encode_png
 from resdepth_colmap.scene import ColorImage, GrayImage
 
 # Rec. 709, the weights of COLMAP's own conversion to grey.
@@ -71,8 +72,7 @@ def write_png(path: Path, rgb: ColorImage) -> None:
     """
     if rgb.ndim != 3 or rgb.shape[2] != 3 or rgb.dtype != np.uint8:
         raise ValueError(f"{rgb.shape=}, {rgb.dtype=} but expected (H, W, 3), uint8.")
-    with whole_file(path) as partial:
-        Image.fromarray(rgb).save(partial, format="PNG")
+    write_whole(path, encode_png(rgb))
 
 
 def _read_unit(path: Path) -> npt.NDArray[np.float32]:
