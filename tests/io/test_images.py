@@ -1,5 +1,3 @@
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -91,19 +89,3 @@ def test_what_is_no_image_is_named(tmp_path: Path) -> None:
 def test_a_picture_of_wrong_type_is_a_bug_of_the_caller(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="expected"):
         write_png(tmp_path / "a.png", np.zeros((2, 2), np.uint8))
-
-
-@pytest.mark.parametrize("order", ["pycolmap, cv2", "cv2, pycolmap"])
-def test_images_are_read_and_written_in_both_import_orders(
-    tmp_path: Path, order: str
-) -> None:
-    path = tmp_path / "a.png"
-    code = (
-        f"import {order}\n"
-        "import sys, numpy, pathlib\n"
-        "from resdepth_colmap.io.images import read_rgb, write_png\n"
-        "path = pathlib.Path(sys.argv[1])\n"
-        "write_png(path, numpy.full((4, 5, 3), 7, numpy.uint8))\n"
-        "sys.exit(int((read_rgb(path) != 7).any()))\n"
-    )
-    subprocess.run([sys.executable, "-c", code, str(path)], check=True)
