@@ -157,6 +157,8 @@ class NetworkConfig(Config):
         valid: Give it the mask of pixels whose depth was real, not filled.
         photo_consistency: Give it the local correlation of reference and warped view.
         gate: Let it weigh its residual by a learned gate in 0..1.
+        last_block: One more convolution block at full resolution, before the last
+            convolution: lets it weigh fine structure by what surrounds it.
         confidence: Let it predict the scale of its own error.
         normalisation: How inverse depth is scaled.
     """
@@ -169,6 +171,7 @@ class NetworkConfig(Config):
     valid: bool = True
     photo_consistency: bool = True
     gate: bool = True
+    last_block: bool = True
     confidence: bool = True
     normalisation: Normalisation = Normalisation.ROBUST
 
@@ -196,6 +199,7 @@ class NetworkConfig(Config):
             variant=variant,
             valid=False,
             gate=False,
+            last_block=False,
             photo_consistency=False,
             confidence=False,
             normalisation=Normalisation.BASELINE,

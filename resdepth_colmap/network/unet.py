@@ -31,8 +31,9 @@ class ResDepthNet(nn.Module):
     convolution, batch norm, ReLU and 2x2 max pooling; one such convolution at the
     bottleneck; each decoder level is a 2x2 up-convolution that keeps its channels, the
     addition of the encoder's map of that size, and a 3x3 convolution to the channels of
-    the next level; a plain 3x3 convolution ends it. Channels double from
-    `base_channels` up to `max_channels`. At 64 to 512 channels, 7 levels and three
+    the next level; a plain 3x3 convolution ends it, after one more block at full
+    resolution if `last_block` says so (the published code has none). Channels double
+    from `base_channels` up to `max_channels`. At 64 to 512 channels, 7 levels and three
     inputs it has 24.2 million parameters, and a tile of 512 x 512 reaches the
     bottleneck as 512 x 4 x 4.
 
@@ -68,6 +69,9 @@ class ResDepthNet(nn.Module):
         self.decoder = nn.ModuleList(
             _conv_block(before, after)
             for before, after in zip(widths[:0:-1], outputs[:0:-1], strict=True)
+        )
+        self.last_block = (
+            _conv_block(widths[0], widths[0]) if config.last_block else nn.Identity()
         )
         num_outputs = 1 + config.gate + config.confidence
         self.head = nn.Conv2d(widths[0], num_outputs, kernel_size=3, padding=1)
@@ -108,7 +112,7 @@ class ResDepthNet(nn.Module):
         features = maps.pop()
         for up, block in zip(self.up[:-1], self.decoder, strict=True):
             features = block(up(features) + maps.pop())
-        finest: Tensor = self.up[-1](features) + maps.pop()
+        finest: Tensor = self.last_block(self.up[-1](features) + maps.pop())
         return finest
 
     def _squash(self, stack: Tensor) -> Tensor:

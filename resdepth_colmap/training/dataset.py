@@ -106,7 +106,7 @@ def prepare_samples(
         TrainingError: If no view has both.
     """
     progress = progress or SilentProgress()
-    key = json.dumps(config.to_mapping(), sort_keys=True)
+    key = json.dumps(config.channels)  # no other option changes a sample
     folder = cache / hashlib.sha256(key.encode()).hexdigest()[:12]
     paths: list[Path] = []
     with progress.stage("Preparing samples", len(workspaces)) as advance:
