@@ -22,11 +22,11 @@ from resdepth_colmap.scene import Scene, View
 MOST_MAPS_READ = 8  # of each kind, spread over the views: info is to be quick
 CFG_NAMES = ("patch-match.cfg", "fusion.cfg")
 
-# Measured on two cores of a 2.x GHz server (docs/benchmarks.md); a guide, no promise.
+# Measured on two cores with the default options; a guide, no promise.
 MEASURED_CORES = 2
-STEREO_S_PER_MEGAPIXEL = 60.0
-REFINE_S_PER_MEGAPIXEL_AND_PASS = 6.0
-REFINE_BASE_MB = 900.0  # libraries, weights, one tile in the network
+STEREO_S_PER_MEGAPIXEL = 30.0
+REFINE_S_PER_MEGAPIXEL_AND_PASS = 2.5
+REFINE_BASE_MB = 700.0  # libraries, weights, one tile in the network
 REFINE_MB_PER_MEGAPIXEL = 150.0  # images, warped views and maps of one view
 
 

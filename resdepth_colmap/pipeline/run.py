@@ -19,7 +19,6 @@ from resdepth_colmap.network.device import resolve_device
 from resdepth_colmap.network.weights import load_weights
 from resdepth_colmap.pipeline.fuse import count_consistent, fuse_workspace
 from resdepth_colmap.pipeline.fuse_to_file import cloud_path
-from resdepth_colmap.pipeline.pictures import draw_workspace
 from resdepth_colmap.pipeline.progress import Progress, SilentProgress
 from resdepth_colmap.pipeline.refine_workspace import RefineReport, refine_workspace
 from resdepth_colmap.pipeline.run_config import RunConfig
@@ -172,6 +171,8 @@ class _Run:
         return statistics.num_points
 
     def _draw(self, result: RunResult) -> RunResult:
+        from resdepth_colmap.pipeline.pictures import draw_workspace  # fonts: slow
+
         with self._timed("pictures"):
             path = draw_workspace(self.output, self.scene, result.refine, self.progress)
         return dataclasses.replace(result, overview_path=path)
