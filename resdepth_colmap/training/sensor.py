@@ -1,0 +1,92 @@
+"""What a real camera does to light: exposure, blur, noise, JPEG."""
+
+import dataclasses
+import io
+from typing import Self
+
+import cv2
+import numpy as np
+from PIL import Image
+
+from resdepth_colmap.scene import ColorImage
+from resdepth_colmap.training.render import Floats
+from resdepth_colmap.training.textures import Rng
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Sensor:
+    """One camera on one day.
+
+    Attributes:
+        brightness: Where the median of the first view ends, 0..1 in linear light.
+        exposure_spread: Deviation of the log exposure from view to view.
+        gamma_spread: Deviation of the log gamma from view to view.
+        vignetting: Share of light lost in the corners.
+        blur_px: Deviation of the lens blur.
+        noise: Deviation of the noise at mid grey, of full scale.
+        quality: JPEG quality.
+    """
+
+    brightness: float
+    exposure_spread: float
+    gamma_spread: float
+    vignetting: float
+    blur_px: float
+    noise: float
+    quality: int
+
+    @classmethod
+    def draw(cls, rng: Rng) -> Self:
+        """A random one: mostly good; strong differences of exposure in 15 %."""
+        strong = rng.random() < 0.15
+        return cls(
+            brightness=float(rng.uniform(0.10, 0.3)),
+            exposure_spread=0.5 if strong else float(rng.uniform(0, 0.06)),
+            gamma_spread=0.12 if strong else float(rng.uniform(0, 0.03)),
+            vignetting=float(rng.choice([0.0, rng.uniform(0, 0.3)])),
+            blur_px=float(rng.uniform(0.3, 1.0)),
+            noise=float(np.exp(rng.uniform(np.log(0.002), np.log(0.02)))),
+            quality=int(rng.integers(85, 98)),
+        )
+
+    def gain_for(self, radiance: Floats) -> float:
+        """Exposure that brings the median of a picture to `brightness`."""
+        return self.brightness / max(float(np.median(radiance)), 1e-6)
+
+    def expose(self, rng: Rng, radiance: Floats, gain: float) -> ColorImage:
+        """A developed photograph.
+
+        Args:
+            rng: Noise and the view's own exposure come from it.
+            radiance: Linear light, shape (H, W, 3).
+            gain: Exposure of the scene, see gain_for.
+        """
+        light = radiance * np.float32(
+            gain * np.exp(rng.normal(0, self.exposure_spread))
+        )
+        light = light * (1 + rng.normal(0, 0.01, 3)).astype(np.float32)
+        light = cv2.GaussianBlur(
+            light * self._falloff(light.shape), (0, 0), self.blur_px
+        )
+        curve = np.where(
+            light < 0.5, light, 1 - 0.5 * np.exp(1 - 2 * light)
+        )  # soft shoulder
+        grain = rng.standard_normal(curve.shape, dtype=np.float32)
+        curve = curve + self.noise * np.sqrt(0.05 + 0.5 * np.maximum(curve, 0)) * grain
+        gamma = np.exp(rng.normal(0, self.gamma_spread)) / 2.2
+        screen = np.clip(curve, 0, 1) ** np.float32(gamma)
+        return _through_jpeg(np.round(screen * 255).astype(np.uint8), self.quality)
+
+    def _falloff(self, shape: tuple[int, ...]) -> Floats:
+        height, width = shape[:2]
+        y = (np.arange(height) + 0.5) / height * 2 - 1
+        x = (np.arange(width) + 0.5) / width * 2 - 1
+        distance2 = (y[:, None] ** 2 + x[None, :] ** 2) / 2
+        return (1 - self.vignetting * distance2)[..., None].astype(np.float32)
+
+
+def _through_jpeg(rgb: ColorImage, quality: int) -> ColorImage:
+    memory = io.BytesIO()
+    Image.fromarray(rgb).save(memory, format="JPEG", quality=quality)
+    with Image.open(io.BytesIO(memory.getvalue())) as image:
+        return np.array(image.convert("RGB"), dtype=np.uint8)

@@ -1,0 +1,183 @@
+"""Rendered rooms as COLMAP workspaces with exact depth: to train on, to show with."""
+
+import dataclasses
+import multiprocessing
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pycolmap
+
+from resdepth_colmap.config import SynthesisConfig
+from resdepth_colmap.io.depth_map import write_depth_map
+from resdepth_colmap.io.images import write_png
+from resdepth_colmap.scene import ColorImage, DepthMap, View
+from resdepth_colmap.training.render import Tracer
+from resdepth_colmap.training.room import Style, furnish
+from resdepth_colmap.training.sensor import Sensor
+from resdepth_colmap.training.sparse_points import SparsePoints, sample_points
+from resdepth_colmap.training.viewpoints import choose_views
+
+Progress = Callable[[int, int], None]
+"""Told after each scene: how many are done, of how many."""
+
+_TABLE_SHARE = 0.5
+_STREAM = 20200614  # parts our random numbers from those of other users of the seed
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
+class RenderedScene:
+    """One rendered room.
+
+    Attributes:
+        views: Cameras and poses, V of them.
+        images: One picture a view, shape (H, W, 3), uint8.
+        depths: Exact depth at the pixel centres, shape (H, W), float32; 0 = nothing hit.
+        points: Sparse points with their tracks.
+    """
+
+    views: tuple[View, ...]
+    images: tuple[ColorImage, ...]
+    depths: tuple[DepthMap, ...]
+    points: SparsePoints
+
+
+def render_room(
+    config: SynthesisConfig, seed: int, style: Style | None = None
+) -> RenderedScene:
+    """Render one room. The same arguments give the same bytes.
+
+    Args:
+        config: Number and size of the views (its seed is not used).
+        seed: Which room.
+        style: What kind of place; None = drawn by the seed.
+    """
+    rng = np.random.default_rng([_STREAM, seed])
+    drawn = Style.TABLE if rng.random() < _TABLE_SHARE else Style.ROOM
+    room = furnish(rng, drawn if style is None else style)
+    tracer = Tracer(room)
+    views = choose_views(rng, room, config, tracer.depth)
+    sensor = Sensor.draw(rng)
+    gain = 0.0
+    images, depths = [], []
+    for view in views:
+        radiance = tracer.radiance(view)
+        gain = gain or sensor.gain_for(radiance)
+        images.append(sensor.expose(rng, radiance, gain))
+        depths.append(tracer.depth(view))
+    points = sample_points(rng, views, images, depths)
+    return RenderedScene(
+        views=views, images=tuple(images), depths=tuple(depths), points=points
+    )
+
+
+def write_scene(path: Path, scene: RenderedScene) -> None:
+    """Write a rendered room as a COLMAP dense workspace, with its exact depth.
+
+    Args:
+        path: The workspace: images/, sparse/, stereo/ (no maps yet) and
+            ground_truth/<image name>.bin in COLMAP's map format.
+        scene: What to write.
+
+    Raises:
+        WorkspaceError: If a file cannot be written.
+    """
+    for folder in ("images", "sparse", "ground_truth"):
+        (path / folder).mkdir(parents=True, exist_ok=True)
+    for kind in ("depth_maps", "normal_maps", "consistency_graphs"):
+        (path / "stereo" / kind).mkdir(parents=True, exist_ok=True)
+    for view, image, depth in zip(scene.views, scene.images, scene.depths, strict=True):
+        write_png(path / "images" / view.name, image)
+        write_depth_map(path / "ground_truth" / f"{view.name}.bin", depth)
+    names = [view.name for view in scene.views]
+    choices = "".join(f"{name}\n__auto__, 20\n" for name in names)
+    (path / "stereo" / "patch-match.cfg").write_text(choices, encoding="utf-8")
+    listing = "".join(f"{name}\n" for name in names)
+    (path / "stereo" / "fusion.cfg").write_text(listing, encoding="utf-8")
+    _reconstruction(scene).write(path / "sparse")
+
+
+def _reconstruction(scene: RenderedScene) -> pycolmap.Reconstruction:
+    model = pycolmap.Reconstruction()
+    points = scene.points
+    first = scene.views[0].camera
+    model.add_camera_with_trivial_rig(
+        pycolmap.Camera(
+            model="PINHOLE",
+            width=first.width_px,
+            height=first.height_px,
+            params=[first.fx, first.fy, first.cx, first.cy],
+            camera_id=1,
+        )
+    )
+    tracks = [pycolmap.Track() for _ in points.xyz]
+    for number, view in enumerate(scene.views):
+        seen = np.flatnonzero(points.visible[number])
+        for place, point in enumerate(seen):
+            tracks[point].add_element(view.image_id, place)
+        image = pycolmap.Image(
+            name=view.name,
+            keypoints=points.xy[number, seen],
+            camera_id=1,
+            image_id=view.image_id,
+        )
+        model.add_image_with_trivial_frame(image, pycolmap.Rigid3d(view.cam_from_world))
+    for xyz, track, rgb in zip(points.xyz, tracks, points.rgb, strict=True):
+        model.add_point3D(xyz, track, rgb)
+    model.update_point_3d_errors()
+    return model
+
+
+def synthesize(
+    output: Path,
+    config: SynthesisConfig,
+    on_progress: Progress | None = None,
+    num_workers: int = 1,
+) -> list[Path]:
+    """Render rooms into workspaces `output`/room_<seed>; finished ones are kept.
+
+    Args:
+        output: Folder of the workspaces.
+        config: How many, from which seed, how large.
+        on_progress: Told after each scene.
+        num_workers: Processes that render at once.
+
+    Returns:
+        The workspaces, in the order of their seeds.
+
+    Raises:
+        WorkspaceError: If a file cannot be written.
+    """
+    seeds = range(config.seed, config.seed + config.num_scenes)
+    jobs = [(output, config, seed) for seed in seeds]
+    paths = []
+    for path in _run(jobs, num_workers):
+        paths.append(path)
+        if on_progress is not None:
+            on_progress(len(paths), len(jobs))
+    return paths
+
+
+_Job = tuple[Path, SynthesisConfig, int]
+
+
+def _run(jobs: list[_Job], num_workers: int) -> Iterator[Path]:
+    if num_workers <= 1:
+        yield from map(_render_into, jobs)
+        return
+    # spawn: a forked child would inherit the threads of open3d half alive
+    with multiprocessing.get_context("spawn").Pool(num_workers) as pool:
+        yield from pool.imap(_render_into, jobs)
+
+
+def _render_into(job: _Job) -> Path:
+    output, config, seed = job
+    path = output / f"room_{seed:06d}"
+    if path.exists():
+        return path
+    unfinished = output / f".room_{seed:06d}.partial"
+    shutil.rmtree(unfinished, ignore_errors=True)
+    write_scene(unfinished, render_room(config, seed))
+    unfinished.rename(path)
+    return path
