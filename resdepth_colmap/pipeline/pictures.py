@@ -1,0 +1,190 @@
+"""Stage "pictures": what the refinement changed, for people to look at."""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from resdepth_colmap.io.depth_map import read_depth_map
+from resdepth_colmap.io.images import read_rgb, write_png
+from resdepth_colmap.io.output import OutputWorkspace
+from resdepth_colmap.pipeline.canvas import (
+    BAR_HEIGHT_PX,
+    BAR_LABEL_HEIGHT_PX,
+    Canvas,
+    fitted_size,
+    resized,
+    shortened,
+)
+from resdepth_colmap.pipeline.depth_colors import (
+    DEPTH_COLORS,
+    DepthScale,
+    relative_difference,
+)
+from resdepth_colmap.pipeline.depth_strip import BeforeAfter, depth_strip, filled_share
+from resdepth_colmap.pipeline.initial_map import map_path
+from resdepth_colmap.pipeline.progress import Progress
+from resdepth_colmap.pipeline.refine_workspace import RefineReport
+from resdepth_colmap.scene import ColorImage, DepthMap, Scene
+
+FOLDER = "pictures"
+OVERVIEW_NAME = "overview.png"
+MOST_IN_OVERVIEW = 12
+
+_THUMBNAIL_PX = 220
+_TALLEST_PX = 280  # of a portrait thumbnail
+_MARGIN_PX = 20
+_GAP_PX = 10
+_HEAD_PX = 70
+_CAPTION_PX = 40
+_FOOT_PX = 10 + BAR_HEIGHT_PX + BAR_LABEL_HEIGHT_PX + 24
+
+
+class _Row(NamedTuple):
+    """One image in the overview: its pictures, and the words below them."""
+
+    name: str
+    pictures: tuple[ColorImage, ...]
+    detail: str
+
+
+def draw_workspace(
+    output: OutputWorkspace, scene: Scene, report: RefineReport, progress: Progress
+) -> Path:
+    """Draw a strip of each refined image, and an overview of them all.
+
+    Strips of images that were kept, and have one, are not drawn again.
+
+    Args:
+        output: Where the refined maps are; pictures go to `pictures/` there.
+        scene: The views.
+        report: Which images were refined, from what.
+        progress: Is told of each image.
+
+    Returns:
+        The overview, `overview.png`.
+
+    Raises:
+        WorkspaceError: If a map or an image cannot be read, or a picture not written.
+    """
+    names = [view.name for view in scene.views if view.name in report.images]
+    with progress.stage("Drawing", len(names)) as advance:
+        for name in names:
+            path = output.path / FOLDER / f"{name}.png"
+            if name in report.refined or not path.exists():
+                write_png(path, depth_strip(_load(output, report, name)))
+            advance(1)
+    shown = evenly_chosen(names, MOST_IN_OVERVIEW)
+    contents = (_load(output, report, name) for name in shown)
+    path = output.path / OVERVIEW_NAME
+    write_png(path, overview(output.source.path.name, contents, len(names)))
+    return path
+
+
+def overview(
+    title: str, contents: Iterator[BeforeAfter], num_images: int
+) -> ColorImage:
+    """Draw a workspace: photo, initial and refined depth of some of its images.
+
+    Each image has its own colours (linear in inverse depth, near = red), because the
+    images of a workspace may be of different parts of the scene.
+
+    Args:
+        title: What the workspace is called.
+        contents: The images to show; they are loaded one at a time.
+        num_images: How many there are in all.
+
+    Returns:
+        RGB values, shape (height, width, 3), uint8.
+    """
+    rows = [_row(content) for content in contents]
+    num_columns = 1 if len(rows) <= 3 else 2
+    cell_px = 3 * _THUMBNAIL_PX + 2 * _GAP_PX
+    heights = [row.pictures[0].shape[0] for row in rows]
+    row_px = max(heights, default=0) + _CAPTION_PX + _GAP_PX
+    num_lines = -(-len(rows) // num_columns)
+    canvas = Canvas(
+        2 * _MARGIN_PX + num_columns * (cell_px + 3 * _GAP_PX) - 3 * _GAP_PX,
+        _HEAD_PX + num_lines * row_px + _FOOT_PX,
+    )
+    canvas.words(shortened(title, 50), _MARGIN_PX, 12, size_px=20, bold=True)
+    words = f"{len(rows)} of {num_images} images: photo | initial depth | refined depth"
+    canvas.words(words, _MARGIN_PX, 42, faint=True)
+    for number, row in enumerate(rows):
+        left_px = _MARGIN_PX + number % num_columns * (cell_px + 3 * _GAP_PX)
+        top_px = _HEAD_PX + number // num_columns * row_px
+        _draw_row(canvas, row, left_px, top_px)
+    _draw_legend(canvas, _HEAD_PX + num_lines * row_px, cell_px)
+    return canvas.rgb()
+
+
+def evenly_chosen(names: Sequence[str], most: int) -> list[str]:
+    """At most so many of the names, evenly spread, first and last included."""
+    if len(names) <= most:
+        return list(names)
+    places = np.linspace(0, len(names) - 1, most).round().astype(int)
+    return [names[place] for place in places]
+
+
+def _draw_row(canvas: Canvas, row: _Row, left_px: int, top_px: int) -> None:
+    for place, picture in enumerate(row.pictures):
+        step_px = picture.shape[1] + _GAP_PX
+        canvas.picture(picture, left_px + place * step_px, top_px)
+    below_px = top_px + row.pictures[0].shape[0] + 4
+    canvas.words(shortened(row.name, 40), left_px, below_px, size_px=13, bold=True)
+    canvas.words(row.detail, left_px, below_px + 17, size_px=12, faint=True)
+
+
+def _draw_legend(canvas: Canvas, top_px: int, width_px: int) -> None:
+    ticks = [(0.0, "far"), (1.0, "near")]
+    canvas.bar(DEPTH_COLORS, ticks, _MARGIN_PX, top_px, width_px)
+    words_px = top_px + BAR_HEIGHT_PX + BAR_LABEL_HEIGHT_PX + 2
+    text = "each image by itself: the 2-98 % range of its refined inverse depth"
+    canvas.words(text, _MARGIN_PX, words_px, size_px=12, faint=True)
+    canvas.hole_legend("no depth", _MARGIN_PX + width_px, words_px)
+
+
+def _row(content: BeforeAfter) -> _Row:
+    scale = DepthScale.of(content.after, content.before)
+    height_px, width_px = content.before.shape
+    scaled_px = round(height_px * _THUMBNAIL_PX / width_px)
+    long_side_px = max(_THUMBNAIL_PX, min(scaled_px, _TALLEST_PX))
+    size = fitted_size((height_px, width_px), long_side_px)
+    pictures = (
+        content.rgb,
+        scale.colored(content.before),
+        scale.colored(content.after),
+    )
+    change = np.abs(relative_difference(content.before, content.after))
+    change = change[np.isfinite(change)]
+    median = float(np.median(change)) if change.size else 0.0
+    detail = (
+        f"filled {100 * filled_share(content.before):.1f} → "
+        f"{100 * filled_share(content.after):.1f} %, "
+        f"median change {100 * median:.2g} %"
+    )
+    return _Row(
+        content.name,
+        tuple(resized(picture, size[0], size[1]) for picture in pictures),
+        detail,
+    )
+
+
+def _load(output: OutputWorkspace, report: RefineReport, name: str) -> BeforeAfter:
+    source = output.source
+    before = read_depth_map(map_path(source, name, report.images[name]["input"]))
+    after = read_depth_map(output.depth_map_path(name))
+    truth_path = source.truth_path(name)
+    truth = read_depth_map(truth_path) if truth_path.is_file() else None
+    if truth is not None and truth.shape != before.shape:
+        truth = _nearest(truth, before.shape)
+    rgb = read_rgb(source.image_path(name))
+    return BeforeAfter(name=name, rgb=rgb, before=before, after=after, truth=truth)
+
+
+def _nearest(depth: DepthMap, shape: tuple[int, ...]) -> DepthMap:
+    size = (shape[1], shape[0])
+    smaller = cv2.resize(depth, size, interpolation=cv2.INTER_NEAREST)
+    return np.asarray(smaller, np.float32)
