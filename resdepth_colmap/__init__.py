@@ -5,6 +5,7 @@ The names below are the library; each is imported when it is first asked for, so
 """
 
 import importlib
+import zlib as _zlib  # noqa: F401  pycolmap before zlib corrupts it: see io/png.py
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -15,7 +16,8 @@ if TYPE_CHECKING:
     from resdepth_colmap.pipeline.fuse import fuse_workspace
     from resdepth_colmap.pipeline.refine import refine_view
     from resdepth_colmap.pipeline.refine_workspace import refine_workspace
-    from resdepth_colmap.pipeline.run import RunConfig, run_refine
+    from resdepth_colmap.pipeline.run import run_refine
+    from resdepth_colmap.pipeline.run_config import RunConfig
     from resdepth_colmap.scene import Camera, Scene, View
 
     __version__: str
@@ -43,7 +45,7 @@ _MODULE_OF = {
     "FuseConfig": "config",
     "RefineConfig": "config",
     "ResDepthError": "errors",
-    "RunConfig": "pipeline.run",
+    "RunConfig": "pipeline.run_config",
     "Scene": "scene",
     "StereoConfig": "config",
     "View": "scene",

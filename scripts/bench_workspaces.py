@@ -59,7 +59,8 @@ def prepare(case: str, data: Path, output: Path) -> tuple[Path, float]:
 def measure(case: str, data: Path, output: Path) -> dict[str, Any]:
     """Run the command on the case and collect what its record says."""
     workspace, sfm_s = prepare(case, data, output)
-    command = [Path(sys.executable).parent / "resdepth-colmap", "refine", workspace]
+    program = Path(sys.executable).parent / "resdepth-colmap"
+    command = [str(program), "refine", str(workspace)]
     start = time.perf_counter()
     subprocess.run([*command, *CASES[case][1]], check=True)
     wall_s = time.perf_counter() - start

@@ -2,15 +2,12 @@
 
 import dataclasses
 from collections.abc import Mapping
-from pathlib import Path
 
 from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.evaluation.depth_metrics import DepthMetrics, depth_metrics
 from resdepth_colmap.io.depth_map import read_depth_map
 from resdepth_colmap.io.output import OutputWorkspace
 from resdepth_colmap.pipeline.initial_map import map_path
-
-TRUTH_FOLDER = "ground_truth"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -26,11 +23,6 @@ class Comparison:
     name: str
     before: DepthMetrics
     after: DepthMetrics
-
-
-def truth_path(workspace_path: Path, name: str) -> Path:
-    """The true depth map of an image, in COLMAP's map format; it may not exist."""
-    return workspace_path / TRUTH_FOLDER / f"{name}.bin"
 
 
 def compare_with_truth(
@@ -52,7 +44,7 @@ def compare_with_truth(
     workspace = output.source
     comparisons = []
     for name, kind in kinds.items():
-        path = truth_path(workspace.path, name)
+        path = workspace.truth_path(name)
         if not path.is_file():
             continue
         truth = read_depth_map(path)
@@ -72,6 +64,6 @@ def compare_with_truth(
         )
     if not comparisons:
         raise WorkspaceError(
-            f"{workspace.path / TRUTH_FOLDER}: no true depth map of any refined image."
+            f"{workspace.path}: no ground_truth/<image>.bin of any refined image."
         )
     return tuple(comparisons)

@@ -48,6 +48,10 @@ class Workspace:
         """The normal map of an image; it may not exist. `kind` as in `map_kinds`."""
         return self.stereo_path / "normal_maps" / f"{safe_name(name)}.{kind}.bin"
 
+    def truth_path(self, name: str) -> Path:
+        """The true depth map of an image, where one is known; it may not exist."""
+        return self.path / "ground_truth" / f"{safe_name(name)}.bin"
+
     def map_kinds(self, name: str) -> tuple[str, ...]:
         """The kinds of depth map an image has: each K of a file `<name>.K.bin`.
 

@@ -127,7 +127,7 @@ def _prepare_workspace(
     scene = read_scene(workspace.sparse_path, workspace.images_path, workspace.path)
     paths = []
     for index, view in enumerate(scene.views):
-        truth_path = workspace.path / "ground_truth" / f"{view.name}.bin"
+        truth_path = workspace.truth_path(view.name)
         kinds = workspace.map_kinds(view.name)
         if not kinds or not truth_path.exists():
             continue

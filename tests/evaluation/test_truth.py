@@ -9,7 +9,7 @@ from workspaces import identity_weights, plane_folder
 
 from resdepth_colmap.config import RefineConfig
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.evaluation.truth import compare_with_truth, truth_path
+from resdepth_colmap.evaluation.truth import compare_with_truth
 from resdepth_colmap.io.depth_map import read_depth_map, write_depth_map
 from resdepth_colmap.io.output import OutputWorkspace
 from resdepth_colmap.io.workspace import open_workspace
@@ -28,7 +28,7 @@ def test_an_error_is_seen_before_and_after(tmp_path: Path) -> None:
     output = refined(tmp_path)
     for name in NAMES[:2]:
         truth = read_depth_map(output.source.depth_map_path(name, "geometric"))
-        write_depth_map(truth_path(output.source.path, name), truth)
+        write_depth_map(output.source.truth_path(name), truth)
         write_depth_map(output.depth_map_path(name), truth + np.float32(0.5))
     first, second = compare_with_truth(output, KINDS)
     assert (first.name, second.name) == NAMES[:2]
@@ -43,7 +43,7 @@ def test_without_any_truth_the_folder_is_named(tmp_path: Path) -> None:
 
 def test_a_truth_of_another_size_is_refused(tmp_path: Path) -> None:
     output = refined(tmp_path)
-    path = truth_path(output.source.path, NAMES[0])
+    path = output.source.truth_path(NAMES[0])
     write_depth_map(path, np.ones((6, 8), np.float32))
     with pytest.raises(WorkspaceError, match="another size"):
         compare_with_truth(output, KINDS)
