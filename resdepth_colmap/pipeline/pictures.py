@@ -1,6 +1,7 @@
 """Stage "pictures": what the refinement changed, for people to look at."""
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -34,6 +35,8 @@ OVERVIEW_NAME = "overview.png"
 MOST_IN_OVERVIEW = 12
 
 _THUMBNAIL_PX = 220
+_LEAST_CELL_PX = 470  # the words of the legend need as much
+_WIDEST_PX = 1700
 _TALLEST_PX = 280  # of a portrait thumbnail
 _MARGIN_PX = 20
 _GAP_PX = 10
@@ -84,7 +87,7 @@ def draw_workspace(
 
 
 def overview(
-    title: str, contents: Iterator[BeforeAfter], num_images: int
+    title: str, contents: Iterable[BeforeAfter], num_images: int
 ) -> ColorImage:
     """Draw a workspace: photo, initial and refined depth of some of its images.
 
@@ -100,23 +103,23 @@ def overview(
         RGB values, shape (height, width, 3), uint8.
     """
     rows = [_row(content) for content in contents]
-    num_columns = 1 if len(rows) <= 3 else 2
-    cell_px = 3 * _THUMBNAIL_PX + 2 * _GAP_PX
-    heights = [row.pictures[0].shape[0] for row in rows]
-    row_px = max(heights, default=0) + _CAPTION_PX + _GAP_PX
-    num_lines = -(-len(rows) // num_columns)
-    canvas = Canvas(
-        2 * _MARGIN_PX + num_columns * (cell_px + 3 * _GAP_PX) - 3 * _GAP_PX,
-        _HEAD_PX + num_lines * row_px + _FOOT_PX,
-    )
+    cell_px = max([_LEAST_CELL_PX, *(_width_px(row) for row in rows)])
+    num_fitting = max(2, _WIDEST_PX // cell_px)
+    num_columns = max(1, min(num_fitting, math.ceil(math.sqrt(len(rows)))))
+    lines = [rows[at : at + num_columns] for at in range(0, len(rows), num_columns)]
+    pitch_px = cell_px + 3 * _GAP_PX
+    width_px = 2 * _MARGIN_PX + num_columns * pitch_px - 3 * _GAP_PX
+    lines_px = sum(_height_px(line) for line in lines)
+    canvas = Canvas(width_px, _HEAD_PX + lines_px + _FOOT_PX)
     canvas.words(shortened(title, 50), _MARGIN_PX, 12, size_px=20, bold=True)
     words = f"{len(rows)} of {num_images} images: photo | initial depth | refined depth"
     canvas.words(words, _MARGIN_PX, 42, faint=True)
-    for number, row in enumerate(rows):
-        left_px = _MARGIN_PX + number % num_columns * (cell_px + 3 * _GAP_PX)
-        top_px = _HEAD_PX + number // num_columns * row_px
-        _draw_row(canvas, row, left_px, top_px)
-    _draw_legend(canvas, _HEAD_PX + num_lines * row_px, cell_px)
+    top_px = _HEAD_PX
+    for line in lines:
+        for column, row in enumerate(line):
+            _draw_row(canvas, row, _MARGIN_PX + column * pitch_px, top_px)
+        top_px += _height_px(line)
+    _draw_legend(canvas, top_px, cell_px)
     return canvas.rgb()
 
 
@@ -126,6 +129,15 @@ def evenly_chosen(names: Sequence[str], most: int) -> list[str]:
         return list(names)
     places = np.linspace(0, len(names) - 1, most).round().astype(int)
     return [names[place] for place in places]
+
+
+def _width_px(row: _Row) -> int:
+    return int(sum(picture.shape[1] + _GAP_PX for picture in row.pictures)) - _GAP_PX
+
+
+def _height_px(line: Sequence[_Row]) -> int:
+    tallest_px = max(row.pictures[0].shape[0] for row in line)
+    return int(tallest_px) + _CAPTION_PX + _GAP_PX
 
 
 def _draw_row(canvas: Canvas, row: _Row, left_px: int, top_px: int) -> None:
