@@ -56,7 +56,8 @@ def test_refine_draws_what_changed(tmp_path: Path) -> None:
     pictures = [path for path in pictures if "images" not in path.parts]
     assert len(pictures) == len(NAMES) + 1
     for path in pictures:
-        assert Image.open(path).size[0] > 200
+        with Image.open(path) as picture:
+            assert picture.size[0] > 200
     assert any(str(path) in result.stdout for path in pictures)
 
 
