@@ -9,6 +9,7 @@ docs/measurements/workspaces.json.
 """
 
 import argparse
+import datetime
 import json
 import os
 import shutil
@@ -67,6 +68,7 @@ def measure(case: str, data: Path, output: Path) -> dict[str, Any]:
     record = json.loads((workspace / "resdepth" / "run.json").read_text("utf-8"))
     images = record["images"].values()
     return {
+        "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
         "options": CASES[case][1],
         "num_images": len(images),
         "seconds": {"structure_from_motion": round(sfm_s, 1), **record["seconds"]},

@@ -1,0 +1,248 @@
+"""Markdown tables of what was measured, and the places in documents that hold them.
+
+A place is what lies between `<!-- name -->` and `<!-- /name -->`.
+"""
+
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+HARDWARE = "two cores of an AMD EPYC, no GPU"
+DEPTHS = {"unfiltered": "unfiltered", "median": "5 x 5 median", "refined": "refined"}
+_NOT_KNOWN = "-"
+
+Measured = Mapping[str, Any]
+"""A file of docs/measurements, parsed."""
+
+
+def middlebury_table(measured: Measured) -> str:
+    """Every error of every scene, how good the matcher is, and the mean ratios."""
+    scenes = measured["scenes"]
+    errors = [
+        [name, label, *_error_cells(scene[key]), f"{scene[key]['num_valid']:,}"]
+        for name, scene in scenes.items()
+        for key, label in DEPTHS.items()
+    ]
+    means = [
+        ["**mean**", label, *_error_cells(_mean_errors(measured, key)), ""]
+        for key, label in DEPTHS.items()
+    ]
+    matching = [_matching_row(name, scene) for name, scene in scenes.items()]
+    return "\n\n".join(
+        [
+            _measured_by(measured),
+            _ratio_sentence(measured),
+            _table(
+                "scene | depth | MAE, m | RMSE, m | MedAE, mm | off by > 2 % | "
+                "valid pixels",
+                errors + means,
+                num_texts=2,
+            ),
+            "The matcher alone, where both views see the surface; "
+            "and processor seconds a megapixel:",
+            _table(
+                "scene | median relative error | off by > 1 % | off by > 2 % | "
+                "MAE, m | matching, s | refining, s",
+                matching,
+            ),
+        ]
+    )
+
+
+def middlebury_summary(measured: Measured) -> str:
+    """One row a scene: mean absolute error, and what is off by more than 2 %."""
+    rows = [
+        _summary_row(name, {key: scene[key] for key in DEPTHS})
+        for name, scene in measured["scenes"].items()
+    ]
+    means = {key: _mean_errors(measured, key) for key in DEPTHS}
+    header = "scene | " + " | ".join(
+        [f"MAE, m: {label}" for label in DEPTHS.values()]
+        + [f"off by > 2 %: {DEPTHS[key]}" for key in ("unfiltered", "refined")]
+    )
+    return "\n\n".join(
+        [
+            _table(header, [*rows, _summary_row("**mean**", means)]),
+            _ratio_sentence(measured),
+            _measured_by(measured),
+        ]
+    )
+
+
+def workspaces_table(measured: Measured) -> str:
+    """Seconds a stage, memory, and what there was before and after."""
+    stages = list(
+        dict.fromkeys(s for case in measured.values() for s in case["seconds"])
+    )
+    header = (
+        " | ".join(["workspace", "options", "images", *map(_spoken, stages)])
+        + " | in all, s | peak memory | points before | points after"
+        + " | filled before | filled after | date"
+    )
+    rows = [_workspace_row(name, case, stages) for name, case in measured.items()]
+    command = "python scripts/bench_workspaces.py"
+    return "\n\n".join(
+        [
+            f"Measured by `{command}` on {HARDWARE}; stages in seconds.",
+            _table(header, rows, num_texts=2),
+        ]
+    )
+
+
+def refine_table(measured: Measured) -> str:
+    """Seconds a megapixel and pass, by size."""
+    rows = [
+        [
+            f"{size['width_px']} x {size['height_px']}",
+            f"{size['megapixels']:.2f}",
+            f"{size['s_per_mp_and_pass']:.2f}",
+            " ".join(f"{seconds:.1f}" for seconds in size["seconds"]),
+        ]
+        for size in measured["sizes"]
+    ]
+    header = "size, px | megapixels | s a megapixel and pass | s of each repetition"
+    return "\n\n".join([_measured_by(measured), _table(header, rows)])
+
+
+Renderer = Callable[[Measured], str]
+
+DOCUMENTS: dict[str, dict[str, Renderer]] = {
+    "README.md": {"middlebury": middlebury_summary},
+    "docs/benchmarks.md": {
+        "middlebury": middlebury_table,
+        "workspaces": workspaces_table,
+        "refine": refine_table,
+    },
+}
+"""The documents, and who renders the place of each name from the file of that name."""
+
+
+def rendered(document: str, measurements: Path) -> dict[str, str]:
+    """What the places of a document have to hold, as far as it was measured.
+
+    Args:
+        document: A key of `DOCUMENTS`.
+        measurements: Folder of the JSON files.
+
+    Returns:
+        Markdown by the name of the place; none where the JSON file is not there.
+    """
+    texts = {}
+    for name, render in DOCUMENTS[document].items():
+        path = measurements / f"{name}.json"
+        if path.is_file():
+            texts[name] = render(json.loads(path.read_text("utf-8")))
+    return texts
+
+
+def filled_in(text: str, places: Mapping[str, str]) -> str:
+    """A document with new text in its places; a place that it lacks is passed over.
+
+    Raises:
+        ValueError: If a place is opened but not closed, or there twice.
+    """
+    for name, content in places.items():
+        start, end = f"<!-- {name} -->", f"<!-- /{name} -->"
+        if start not in text and end not in text:
+            continue
+        before, _, rest = text.partition(start)
+        _, found, after = rest.partition(end)
+        if text.count(start) != 1 or text.count(end) != 1 or not found:
+            raise ValueError(f"expected one {start} and one {end} after it.")
+        text = f"{before}{start}\n\n{content}\n\n{end}{after}"
+    return text
+
+
+def _error_cells(errors: Measured) -> list[str]:
+    return [
+        _number(errors["mae"]),
+        _number(errors["rmse"]),
+        _number(errors["medae"], scale=1000, digits=1),
+        _percent(errors["bad_2"]),
+    ]
+
+
+def _matching_row(name: str, scene: Measured) -> list[str]:
+    seen = scene["unfiltered_seen_by_both"]
+    return [
+        name,
+        _percent(seen["median_relative_error"], digits=2),
+        _percent(seen["bad_1"]),
+        _percent(seen["bad_2"]),
+        _number(seen["mae"]),
+        _number(scene["matching_cpu_s_per_mp"], digits=1),
+        _number(scene["refining_cpu_s_per_mp"], digits=1),
+    ]
+
+
+def _summary_row(name: str, errors: Mapping[str, Measured]) -> list[str]:
+    maes = [_number(errors[key]["mae"]) for key in DEPTHS]
+    bad = [_percent(errors[key]["bad_2"]) for key in ("unfiltered", "refined")]
+    return [name, *maes, *bad]
+
+
+def _workspace_row(name: str, case: Measured, stages: list[str]) -> list[str]:
+    memory_mb = case["peak_memory_mb"]
+    return [
+        name,
+        f"`{' '.join(case['options'])}`" if case["options"] else "",
+        str(case["num_images"]),
+        *[_number(case["seconds"].get(stage), digits=1) for stage in stages],
+        _number(case["seconds_in_all"], digits=1),
+        _NOT_KNOWN if memory_mb is None else f"{memory_mb / 1024:.1f} GiB",
+        *[_count(case[key]) for key in ("points_before", "points_after")],
+        *[_percent(case[key], 0) for key in ("filled_before", "filled_after")],
+        case.get("date", _NOT_KNOWN),
+    ]
+
+
+def _mean_errors(measured: Measured, key: str) -> dict[str, float | None]:
+    """Of each error the mean over the scenes; None if it is missing in one."""
+    means: dict[str, float | None] = {}
+    for error in ("mae", "rmse", "medae", "bad_2"):
+        values = [scene[key][error] for scene in measured["scenes"].values()]
+        is_whole = None not in values and values
+        means[error] = sum(values) / len(values) if is_whole else None
+    return means
+
+
+def _ratio_sentence(measured: Measured) -> str:
+    mean, passes = measured["mean"], measured["options"]["refine"]["passes"]
+    return (
+        f"Refined over unfiltered, mean of {len(measured['scenes'])} scenes: MAE "
+        f"{_number(mean['mae_ratio'], digits=2)}, "
+        f"MedAE {_number(mean['medae_ratio'], digits=2)} "
+        f"({passes} {'pass' if passes == 1 else 'passes'})."
+    )
+
+
+def _measured_by(measured: Measured) -> str:
+    return (
+        f"Measured by `{measured['command']}` on {measured['date']}, {HARDWARE}; "
+        f"weights `{measured['weights_sha256'][:12]}`."
+    )
+
+
+def _table(header: str, rows: list[list[str]], num_texts: int = 1) -> str:
+    """The first columns are texts, to the left; the others numbers, to the right."""
+    num_numbers = header.count(" | ") + 1 - num_texts
+    rule = "|".join(["---"] * num_texts + ["--:"] * num_numbers)
+    lines = [f"| {header} |", f"|{rule}|"]
+    return "\n".join(lines + [f"| {' | '.join(row)} |" for row in rows])
+
+
+def _spoken(stage: str) -> str:
+    return stage.replace("_", " ")
+
+
+def _number(value: float | None, scale: float = 1, digits: int = 3) -> str:
+    return _NOT_KNOWN if value is None else f"{value * scale:.{digits}f}"
+
+
+def _count(value: int | None) -> str:
+    return _NOT_KNOWN if value is None else f"{value:,}"
+
+
+def _percent(value: float | None, digits: int = 1) -> str:
+    return _NOT_KNOWN if value is None else f"{100 * value:.{digits}f} %"
