@@ -96,7 +96,6 @@ class StereoConfig(Config):
         max_image_size: Longest image side to match at, in pixels; -1 = as it is.
         depth_min: Nearest depth, in workspace units; -1 = from the scene.
         depth_max: Farthest depth, in workspace units; -1 = from the scene.
-        min_triangulation_angle: Least angle of an `__auto__` source, in degrees.
         seed: Seed of the random hypotheses.
     """
 
@@ -108,7 +107,6 @@ class StereoConfig(Config):
     max_image_size: int = -1
     depth_min: float = -1.0
     depth_max: float = -1.0
-    min_triangulation_angle: float = 1.0
     seed: int = 0
 
     def __post_init__(self) -> None:
