@@ -1,6 +1,8 @@
 """Make the README's picture from the folder that `make demo` filled.
 
     make demo && python scripts/make_figures.py
+
+The picture is one of the demo's own strips.
 """
 
 import argparse
