@@ -180,7 +180,7 @@ def tube(path: Matrix, radius: float | Matrix, sides: int = 10) -> Mesh:
     last = np.eye(3)[least]
     for index, direction in enumerate(forward):  # carry the frame along: no twist
         last = last - direction * (last @ direction)
-        last = last / max(float(np.linalg.norm(last)), 1e-12)
+        last = last / np.maximum(np.linalg.norm(last), 1e-12)
         side[index] = last
     other = np.cross(forward, side)
     angle = np.linspace(0, 2 * np.pi, sides + 1)[None, :, None]
@@ -234,16 +234,13 @@ def waves(rng: Rng, position: Matrix, wavelength: float, octaves: int = 4) -> Ma
         wavelength: Longest wavelength, in metres.
         octaves: Each further octave has half the wavelength and half the height.
     """
-    total = np.zeros(position.shape[:-1])
+    total: Matrix = np.zeros(position.shape[:-1])
     for octave in range(octaves):
         for _ in range(4):
             direction = rng.normal(size=position.shape[-1])
-            direction *= (
-                2 * np.pi / (wavelength * 0.5**octave) / np.linalg.norm(direction)
-            )
-            total += 0.5 ** (octave + 1) * np.sin(
-                position @ direction + rng.uniform(0, 2 * np.pi)
-            )
+            direction /= float(np.linalg.norm(direction)) * wavelength * 0.5**octave
+            angle = 2 * np.pi * (position @ direction + rng.random())
+            total += 0.5 ** (octave + 1) * np.sin(angle)
     return total / 1.6
 
 

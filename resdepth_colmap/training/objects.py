@@ -164,7 +164,7 @@ def shelf(rng: Rng) -> Mesh:
         else:
             for x in np.arange(0.1, width - 0.1, rng.uniform(0.15, 0.4)):
                 thing = _fitted(small_thing(rng), min(0.24, gap - 0.04))
-                parts.append(thing.moved(base + [x, 0, 0]))
+                parts.append(thing.moved(base + np.array([x, 0, 0])))
     return merge(parts, keep_slots=False)
 
 

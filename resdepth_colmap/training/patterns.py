@@ -20,7 +20,8 @@ def _cells(rng: Rng, size: int, low: int, high: int) -> tuple[Field, Field, int]
     """Position 0..1 within each of count x count cells, and count (divides 2^n)."""
     count = int(2 ** rng.integers(low, high))
     place = ((np.arange(size, dtype=np.float32) + 0.5) * count / size) % 1
-    return (*np.meshgrid(place, place), count)
+    x, y = np.meshgrid(place.astype(np.float32), place.astype(np.float32))
+    return x, y, count
 
 
 def _dirty(rng: Rng, picture: Picture) -> Picture:
@@ -124,14 +125,9 @@ def _wallpaper(rng: Rng, size: int) -> Picture:
     return _dirty(rng, np.tile(motif, (times, times, 1)))
 
 
-REPEATED: tuple[Maker, ...] = (_tiles, _tiles, _bricks, _checks, _stripes, _stripes) + (
-    _plaid,
-    _dots,
-    _weave,
-    _weave,
-    _lines,
-    _wallpaper,
-    _wallpaper,
+REPEATED: tuple[Maker, ...] = (
+    *(_tiles, _tiles, _bricks, _checks, _stripes, _stripes),
+    *(_plaid, _dots, _weave, _weave, _lines, _wallpaper, _wallpaper),
 )
 
 

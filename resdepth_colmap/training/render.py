@@ -9,7 +9,7 @@ import open3d as o3d
 
 from resdepth_colmap.scene import DepthMap, View
 from resdepth_colmap.training.room import Light, Room
-from resdepth_colmap.training.textures import Picture
+from resdepth_colmap.training.texture_atlas import Atlas
 
 Floats = npt.NDArray[np.float32]
 Indices = npt.NDArray[np.int64]
@@ -30,6 +30,29 @@ class _Hits:
     hit: npt.NDArray[np.bool_]
 
 
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
+class _Surface:
+    """What shading needs where N rays hit.
+
+    Attributes:
+        kind: Index of the material, shape (N,).
+        albedo: Reflected share of the light, shape (N, 3).
+        start: The point, lifted off the surface, shape (N, 3).
+        normal: Unit normal towards the eye, shape (N, 3).
+        mirrored: The ray as the surface would mirror it, shape (N, 3).
+        cosine: Of the angle between normal and ray, shape (N,).
+        open_sky: Share of the ambient light that arrives, shape (N,).
+    """
+
+    kind: Indices
+    albedo: Floats
+    start: Floats
+    normal: Floats
+    mirrored: Floats
+    cosine: Floats
+    open_sky: Floats
+
+
 class Tracer:
     """A room made ready for rays: geometry, textures with mip maps, baked occlusion.
 
@@ -38,7 +61,7 @@ class Tracer:
         num_threads: Threads of the ray caster.
     """
 
-    def __init__(self, room: Room, num_threads: int = 1) -> None:
+    def __init__(self, room: Room, num_threads: int = 1) -> None:  # noqa: D107
         self.room = room
         mesh = room.mesh
         self._scene = o3d.t.geometry.RaycastingScene(nthreads=num_threads)
@@ -51,9 +74,9 @@ class Tracer:
         length = np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-20)
         self._face_normals = (flat / length).astype(np.float32)
         occlusion = self._bake_occlusion()
-        columns = [mesh.normals, mesh.uv, occlusion[:, None]]
-        self._attributes = np.concatenate(columns, axis=1).astype(np.float32)
-        self._atlas = _Atlas(room.textures)
+        columns = (mesh.normals, mesh.uv, occlusion)
+        self._attributes = np.column_stack(columns).astype(np.float32)
+        self._atlas = Atlas(room.textures)
         kinds = room.materials
         self._texture = np.array([kind.texture for kind in kinds])
         self._tint = np.array([kind.tint for kind in kinds], dtype=np.float32)
@@ -143,139 +166,103 @@ class Tracer:
         footprint: float,
         block: Indices | None,
     ) -> Floats:
-        """Light along rays; `block` picks lamp points, None = no shadows, no mirrors."""
+        """Light along rays (N, 3); `block` picks lamp points, see _light_samples.
+
+        None makes the cheap light of a mirror image: no shadows, no highlights.
+        """
         hits = self._cast(origin, directions)
+        surface = self._surface(hits, origin, directions, footprint)
+        kind = surface.kind
+        diffuse = surface.open_sky[:, None] * self.room.ambient.astype(np.float32)
+        diffuse += self._emission[kind][:, None]
+        shine = np.zeros_like(diffuse)
+        for number, light in enumerate(self.room.lights):
+            arrives, toward = self._illuminate(light, number, surface, block)
+            diffuse += arrives
+            if block is not None:
+                lobe = np.maximum(_dot(surface.mirrored, toward), 1e-6)
+                lobe = self._gloss[kind] * lobe ** self._shininess[kind]
+                shine += lobe[:, None] * np.sqrt(arrives)
+        color = surface.albedo * diffuse + shine
+        if block is not None:
+            self._add_mirrors(color, surface)
+        color[~hits.hit] = 0
+        return np.asarray(color, dtype=np.float32)
+
+    def _surface(
+        self, hits: _Hits, origin: Floats, directions: Floats, footprint: float
+    ) -> _Surface:
         kind = self.room.mesh.slots[hits.faces]
         rows = self._attributes[self.room.mesh.faces[hits.faces]]
         values = np.einsum("nc,nca->na", hits.corners, rows)
         view = directions / np.linalg.norm(directions, axis=1, keepdims=True)
         flat, normal = self._facing(hits, values[:, :3], view)
-        grazing = np.maximum(-np.einsum("ni,ni->n", flat, view), 0.12)
-        width = footprint * hits.distance / grazing**0.6 / self._span[kind]
-        place = (values[:, 3:5] + self._offset[kind]) / self._span[kind][:, None]
-        albedo = (
-            self._atlas.sample(self._texture[kind], place, width) * self._tint[kind]
-        )
+        grazing = np.maximum(-_dot(flat, view), 0.12)
+        span = self._span[kind]
+        width = footprint * hits.distance / grazing**0.6 / span
+        place = (values[:, 3:5] + self._offset[kind]) / span[:, None]
+        texel = self._atlas.sample(self._texture[kind], place, width.astype(np.float32))
+        cosine = _dot(normal, view)
         point = origin + hits.distance[:, None] * directions
-        start = (point + _LIFT * flat).astype(np.float32)
-        sky = 0.75 + 0.25 * normal[:, 2]
-        open_sky = (0.25 + 0.75 * values[:, 5]) * sky
-        diffuse = open_sky[:, None] * self.room.ambient.astype(np.float32)
-        gloss = self._gloss[kind]
-        shine = np.zeros_like(diffuse)
-        mirrored = view - 2 * np.einsum("ni,ni->n", normal, view)[:, None] * normal
-        for number, light in enumerate(self.room.lights):
-            arrives, toward = self._illuminate(light, number, start, normal, block)
-            diffuse += arrives
-            if block is not None:
-                lobe = np.maximum(np.einsum("ni,ni->n", mirrored, toward), 1e-6)
-                lobe = lobe ** self._shininess[kind] * gloss
-                shine += lobe[:, None] * np.sqrt(np.maximum(arrives, 0))
-        color = albedo * (diffuse + self._emission[kind][:, None]) + shine
-        if block is not None:
-            self._add_mirrors(
-                color, start, mirrored, (gloss, -np.einsum("ni,ni->n", normal, view))
-            )
-        color[~hits.hit] = 0
-        return np.asarray(color, dtype=np.float32)
+        return _Surface(
+            kind=kind,
+            albedo=texel * self._tint[kind],
+            start=(point + _LIFT * flat).astype(np.float32),
+            normal=normal,
+            mirrored=(view - 2 * cosine[:, None] * normal).astype(np.float32),
+            cosine=-cosine,
+            # corners are darker, and what looks down is
+            open_sky=(0.25 + 0.75 * values[:, 5]) * (0.75 + 0.25 * normal[:, 2]),
+        )
 
     def _facing(
         self, hits: _Hits, smooth: Floats, view: Floats
     ) -> tuple[Floats, Floats]:
         """Flat and smooth normals, turned towards the eye."""
         flat = self._face_normals[hits.faces]
-        flat = np.where(np.einsum("ni,ni->n", flat, view)[:, None] > 0, -flat, flat)
+        flat = np.where(_dot(flat, view)[:, None] > 0, -flat, flat)
         smooth = smooth / np.maximum(
             np.linalg.norm(smooth, axis=1, keepdims=True), 1e-6
         )
-        turned = np.where(
-            np.einsum("ni,ni->n", flat, smooth)[:, None] < 0, -smooth, smooth
-        )
+        turned = np.where(_dot(flat, smooth)[:, None] < 0, -smooth, smooth)
         return flat, turned.astype(np.float32)
 
     def _illuminate(
-        self,
-        light: Light,
-        number: int,
-        start: Floats,
-        normal: Floats,
-        block: Indices | None,
+        self, light: Light, number: int, surface: _Surface, block: Indices | None
     ) -> tuple[Floats, Floats]:
         """Light of one lamp on surfaces (N, 3), and the unit direction to it (N, 3)."""
-        position = light.position.astype(np.float32)
+        lamp = np.asarray(light.position, dtype=np.float32)
         if block is not None:
-            angle = np.arange(4) * (np.pi / 2) + number
-            ring = np.stack(
-                [np.cos(angle), np.sin(angle), 0.3 * np.sin(2 * angle)], axis=1
-            )
-            position = (position + 0.7 * light.radius * ring).astype(np.float32)[block]
-        toward = position - start
-        distance2 = np.einsum("ni,ni->n", toward, toward)
-        unit = toward / np.sqrt(distance2)[:, None]
-        falloff = np.maximum(np.einsum("ni,ni->n", unit, normal), 0) / (distance2 + 0.3)
+            lamp = _lamp_points(light, number)[block]
+        toward = np.asarray(lamp - surface.start, dtype=np.float32)
+        distance2 = _dot(toward, toward)
+        unit = np.asarray(toward / np.sqrt(distance2)[:, None], dtype=np.float32)
+        falloff = np.maximum(_dot(unit, surface.normal), 0) / (distance2 + 0.3)
         if block is not None:
             lit = np.flatnonzero(falloff > 0)
-            falloff[lit] *= 1 - self._blocked(start[lit], toward[lit])
+            falloff[lit] *= 1 - self._blocked(surface.start[lit], toward[lit])
         return falloff[:, None] * light.color.astype(np.float32), unit
 
-    def _add_mirrors(
-        self,
-        color: Floats,
-        start: Floats,
-        mirrored: Floats,
-        gloss_cos: tuple[Floats, Floats],
-    ) -> None:
+    def _add_mirrors(self, color: Floats, surface: _Surface) -> None:
         """Reflections on the glossy surfaces, stronger where the view grazes."""
-        gloss, cosine = gloss_cos
-        fresnel = gloss * (0.15 + 0.85 * np.clip(1 - cosine, 0, 1) ** 4)
-        rows = np.flatnonzero(fresnel > 0.02)
+        grazing = np.clip(1 - surface.cosine, 0, 1) ** 4
+        share = self._gloss[surface.kind] * (0.15 + 0.85 * grazing)
+        rows = np.flatnonzero(share > 0.02)
         if len(rows) == 0:
             return
-        seen = self._trace(start[rows], mirrored[rows].astype(np.float32), 0.01, None)
-        color[rows] += fresnel[rows, None] * (seen - 0.5 * color[rows])
+        seen = self._trace(surface.start[rows], surface.mirrored[rows], 0.01, None)
+        color[rows] += share[rows, None] * (seen - 0.5 * color[rows])
 
 
-class _Atlas:
-    """All textures and their mip levels in one flat array."""
+def _lamp_points(light: Light, number: int) -> Floats:
+    """Four points on a lamp, shape (4, 3): its shadows are soft."""
+    angle = np.arange(4) * (np.pi / 2) + number
+    ring = np.stack([np.cos(angle), np.sin(angle), np.sin(2 * angle) / 3], axis=1)
+    return np.asarray(light.position + 0.7 * light.radius * ring, dtype=np.float32)
 
-    def __init__(self, textures: list[Picture]) -> None:
-        levels: list[npt.NDArray[np.uint8]] = []
-        most = max(len(picture) for picture in textures).bit_length()
-        self._base = np.zeros((len(textures), most), dtype=np.int64)
-        self._sizes = np.array([len(picture) for picture in textures])
-        total = 0
-        for index, picture in enumerate(textures):
-            level = picture
-            for step in range(len(picture).bit_length()):
-                self._base[index, step] = total
-                levels.append(np.round(level * 255).astype(np.uint8).reshape(-1, 3))
-                total += len(levels[-1])
-                half = max(len(level) // 2, 1)
-                level = cv2.resize(level, (half, half), interpolation=cv2.INTER_AREA)
-        self._texels = np.concatenate(levels)
-        # what a screen shows to what a surface reflects
-        self._linear = (np.arange(256, dtype=np.float32) / 255) ** 2.2
 
-    def sample(self, texture: Indices, place: Floats, width: Floats) -> Floats:
-        """Linear colours at places (N, 2) in repeats, for footprints (N,) in repeats."""
-        full = self._sizes[texture]
-        blur = np.log2(np.maximum(width * full, 1.0))
-        level = np.minimum(
-            np.round(blur).astype(np.int64), np.log2(full).astype(np.int64)
-        )
-        size = full >> level
-        base = self._base[texture, level]
-        xy = (place % 1.0) * size[:, None] - 0.5
-        corner = np.floor(xy).astype(np.int64)
-        share = (xy - corner).astype(np.float32)
-        color = np.zeros((len(place), 3), dtype=np.float32)
-        for dx, wx in ((0, 1 - share[:, 0]), (1, share[:, 0])):
-            x = (corner[:, 0] + dx) & (size - 1)
-            for dy, wy in ((0, 1 - share[:, 1]), (1, share[:, 1])):
-                row = (corner[:, 1] + dy) & (size - 1)
-                texel = self._texels[base + row * size + x]
-                color += (wx * wy)[:, None] * self._linear[texel]
-        return color
+def _dot(first: Floats, second: Floats) -> Floats:
+    return np.asarray(np.einsum("ni,ni->n", first, second), dtype=np.float32)
 
 
 def _pixel_rays(view: View, fineness: int) -> tuple[Floats, Floats]:

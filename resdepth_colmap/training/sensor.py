@@ -19,6 +19,7 @@ class Sensor:
 
     Attributes:
         brightness: Where the median of the first view ends, 0..1 in linear light.
+        highlight: Where at most its brightest 5 % begin; 1 is nearly white.
         exposure_spread: Deviation of the log exposure from view to view.
         gamma_spread: Deviation of the log gamma from view to view.
         vignetting: Share of light lost in the corners.
@@ -28,6 +29,7 @@ class Sensor:
     """
 
     brightness: float
+    highlight: float
     exposure_spread: float
     gamma_spread: float
     vignetting: float
@@ -41,6 +43,7 @@ class Sensor:
         strong = rng.random() < 0.15
         return cls(
             brightness=float(rng.uniform(0.10, 0.3)),
+            highlight=float(rng.uniform(0.5, 1.3)),
             exposure_spread=0.5 if strong else float(rng.uniform(0, 0.06)),
             gamma_spread=0.12 if strong else float(rng.uniform(0, 0.03)),
             vignetting=float(rng.choice([0.0, rng.uniform(0, 0.3)])),
@@ -50,8 +53,13 @@ class Sensor:
         )
 
     def gain_for(self, radiance: Floats) -> float:
-        """Exposure that brings the median of a picture to `brightness`."""
-        return self.brightness / max(float(np.median(radiance)), 1e-6)
+        """Exposure that brings the median of a picture to `brightness`.
+
+        Less, if too much of it would be blown out.
+        """
+        median, bright = np.percentile(radiance, [50, 95])
+        middle = self.brightness / max(float(median), 1e-6)
+        return min(middle, self.highlight / max(float(bright), 1e-6))
 
     def expose(self, rng: Rng, radiance: Floats, gain: float) -> ColorImage:
         """A developed photograph.
@@ -65,9 +73,8 @@ class Sensor:
             gain * np.exp(rng.normal(0, self.exposure_spread))
         )
         light = light * (1 + rng.normal(0, 0.01, 3)).astype(np.float32)
-        light = cv2.GaussianBlur(
-            light * self._falloff(light.shape), (0, 0), self.blur_px
-        )
+        light = light * self._falloff(light.shape)
+        light = np.asarray(cv2.GaussianBlur(light, (0, 0), self.blur_px), np.float32)
         curve = np.where(
             light < 0.5, light, 1 - 0.5 * np.exp(1 - 2 * light)
         )  # soft shoulder

@@ -33,7 +33,7 @@ class RenderedScene:
     Attributes:
         views: Cameras and poses, V of them.
         images: One picture a view, shape (H, W, 3), uint8.
-        depths: Exact depth at the pixel centres, shape (H, W), float32; 0 = nothing hit.
+        depths: Exact depth at the pixel centres, shape (H, W), float32; 0 = no hit.
         points: Sparse points with their tracks.
     """
 
@@ -55,7 +55,7 @@ def render_room(
     """
     rng = np.random.default_rng([_STREAM, seed])
     drawn = Style.TABLE if rng.random() < _TABLE_SHARE else Style.ROOM
-    room = furnish(rng, drawn if style is None else style)
+    room = furnish(rng, drawn if style is None else style, config.width_px)
     tracer = Tracer(room)
     views = choose_views(rng, room, config, tracer.depth)
     sensor = Sensor.draw(rng)

@@ -20,21 +20,23 @@ Maker = Callable[[Rng, int], Picture]
 
 def color(rng: Rng) -> npt.NDArray[np.float32]:
     """One surface colour: mostly muted, sometimes vivid, shape (3,)."""
-    hue = rng.uniform(0, 6)
-    saturation = rng.beta(1.2, 3.0) if rng.random() < 0.8 else rng.uniform(0.5, 0.95)
+    warm = rng.random() < 0.5  # wood, skin, clay, paper: indoors is warm
+    hue = rng.normal(0.55, 0.3) if warm else rng.uniform(0, 6)
+    saturation = rng.beta(1.1, 4.0) if rng.random() < 0.8 else rng.uniform(0.4, 0.9)
     value = rng.uniform(0.18, 0.95)
     wheel = np.clip(np.abs((hue + np.array([0, 4, 2])) % 6 - 3) - 1, 0, 1)
-    return (value * (1 - saturation * (1 - wheel))).astype(np.float32)
+    rgb = value * (1 - saturation * (1 - wheel))
+    return np.asarray(rgb, dtype=np.float32)
 
 
 def palette(rng: Rng, count: int) -> npt.NDArray[np.float32]:
     """Colours that go together, or not, shape (count, 3)."""
     base = color(rng)
-    spread = rng.choice([0.05, 0.15, 0.3, 1.0])
+    spread = rng.choice([0.1, 0.3, 0.6, 1.0])
     others = np.stack([color(rng) for _ in range(count)])
     light = rng.uniform(1 - spread, 1 + spread, (count, 1))
     mixed = (base + spread * (others - base)) * light
-    return np.clip(mixed, 0.02, 0.98).astype(np.float32)
+    return np.asarray(np.clip(mixed, 0.02, 0.98), dtype=np.float32)
 
 
 def spectral(rng: Rng, size: int, slope: float, stretch: float = 1.0) -> Field:
@@ -116,7 +118,8 @@ def _wood(rng: Rng, size: int) -> Picture:
     dark = np.array([0.30, 0.18, 0.09]) * rng.uniform(0.5, 2.0)
     light = dark + np.array([0.30, 0.24, 0.16]) * rng.uniform(0.2, 1.4)
     picture = _ramp(
-        np.stack([dark, light]).astype(np.float32), wave ** rng.uniform(0.5, 2)
+        np.stack([dark, light]).astype(np.float32),
+        (wave ** rng.uniform(0.5, 2)).astype(np.float32),
     )
     picture *= 1 + rng.uniform(0.03, 0.12) * fibre[..., None]
     if rng.random() < 0.5:
@@ -170,7 +173,7 @@ def _draw_wrapped(
                 or low[1] + dy > size
             ):
                 continue
-            points = np.round((outline + [dx, dy]) * 16).astype(np.int32)
+            points = np.round((outline + np.array([dx, dy])) * 16).astype(np.int32)
             cv2.fillPoly(picture, [points], tone.tolist(), cv2.LINE_AA, 4)
 
 
@@ -212,7 +215,6 @@ def _scribbles(rng: Rng, size: int) -> Picture:
 
 def _print(rng: Rng, size: int) -> Picture:
     """A printed page: lines of glyphs, headlines, a picture or two."""
-    light = rng.random() < 0.8
     dark, light = 0.4 * color(rng), rng.uniform(0.75, 0.95) * (0.9 + 0.1 * color(rng))
     ink, paper = (dark, light) if rng.random() < 0.8 else (light, dark)
     share = (_text_lines(rng, size).astype(np.float32) / 255)[..., None]
@@ -262,10 +264,8 @@ def _pixels(rng: Rng, size: int) -> Picture:
     cells = int(rng.choice([16, 32, 64]))
     colors = palette(rng, int(rng.integers(2, 9)))
     index = rng.integers(0, len(colors), (cells, cells))
-    picture: Picture = cv2.resize(
-        colors[index], (size, size), interpolation=cv2.INTER_NEAREST
-    )
-    return picture
+    repeat = np.arange(size) * cells // size
+    return colors[index][repeat][:, repeat]
 
 
 def _terrazzo(rng: Rng, size: int) -> Picture:
@@ -280,12 +280,6 @@ def _terrazzo(rng: Rng, size: int) -> Picture:
 
 WEAK: tuple[Maker, ...] = (_uniform, _faint, _faint, _plaster, _stains)
 RICH: tuple[Maker, ...] = (
-    dead_leaves,
-    dead_leaves,
-    _poster,
-    _poster,
-    _print,
-    _scribbles,
-    _wood,
-    _wood,
-) + (_marble, _cloudy, _cloudy, _grain, _grain, _camouflage, _pixels, _terrazzo)
+    *(dead_leaves, dead_leaves, _poster, _poster, _print, _scribbles, _wood, _wood),
+    *(_marble, _cloudy, _cloudy, _grain, _grain, _camouflage, _pixels, _terrazzo),
+)

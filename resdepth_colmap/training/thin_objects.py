@@ -12,7 +12,7 @@ def pipes(rng: Rng) -> Mesh:
     parts = []
     for _ in range(int(rng.integers(1, 4))):
         radius = rng.uniform(0.008, 0.06)
-        knots = [rng.uniform(-0.3, 0.3, 3) + [0, 0, 0.4]]
+        knots = [rng.uniform([-0.3, -0.3, 0.1], [0.3, 0.3, 0.7])]
         for _ in range(int(rng.integers(2, 7))):
             step = (
                 np.eye(3)[rng.integers(3)]
@@ -23,7 +23,7 @@ def pipes(rng: Rng) -> Mesh:
         path = _rounded(np.array(knots), radius * 3)
         parts.append(meshes.tube(path, radius, sides=14))
         if rng.random() < 0.5:
-            bumps = 1 + 0.25 * (rng.random(len(path)) < 0.1)
+            bumps = np.where(rng.random(len(path)) < 0.1, 1.25, 1.0)
             parts[-1] = meshes.tube(path, radius * bumps, sides=14)
     return merge(parts, keep_slots=False).seated()
 
@@ -239,22 +239,10 @@ def toy(rng: Rng) -> Mesh:
 
 
 THIN: tuple[objects.Builder, ...] = (
-    pipes,
-    pipes,
-    plant,
-    plant,
-    plant,
-    lamp,
-    easel,
-    cloth,
-    relief,
-    relief,
-    wires,
-) + (stairs, lattice, lattice, basket, toy, toy)
+    *(pipes, pipes, plant, plant, plant, lamp, easel, cloth, relief, relief, wires),
+    *(stairs, lattice, lattice, basket, toy, toy),
+)
 FURNITURE: tuple[objects.Builder, ...] = (
-    objects.table,
-    objects.table,
-    objects.chair,
-    objects.chair,
-    objects.chair,
-) + (objects.shelf, objects.shelf)
+    *(objects.table, objects.table, objects.chair, objects.chair, objects.chair),
+    *(objects.shelf, objects.shelf),
+)

@@ -149,7 +149,7 @@ def _views(
 def _offsets(rng: Rng, pattern: str, count: int) -> Matrix:
     """Places (count, 3) in steps along right, down and forward."""
     along = np.arange(count) - (count - 1) / 2
-    jitter = rng.normal(0, 0.15, (count, 3))
+    jitter: Matrix = rng.normal(0, 0.15, (count, 3))
     if pattern == "forward":
         side = rng.uniform(0.2, 0.7, 2)
         return (
@@ -157,7 +157,8 @@ def _offsets(rng: Rng, pattern: str, count: int) -> Matrix:
         )
     if pattern == "cloud":
         radius = 0.6 * np.sqrt(count)
-        return rng.uniform(-1, 1, (count, 3)) * [radius, 0.6 * radius, 0.35 * radius]
+        reach = np.array([1.0, 0.6, 0.35]) * radius
+        return rng.uniform(-reach, reach, (count, 3))
     slope = rng.normal(0, 0.25)
     return np.stack([along, slope * along, 0 * along], axis=1) + jitter
 

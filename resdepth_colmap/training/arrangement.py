@@ -1,0 +1,145 @@
+"""How things stand in a room or on a table: crowded, stacked, some in the air."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from resdepth_colmap.scene import Matrix
+from resdepth_colmap.training import meshes, objects, thin_objects
+from resdepth_colmap.training.furnisher import Furnisher
+from resdepth_colmap.training.meshes import Mesh, Rng
+from resdepth_colmap.training.objects import SMALL, Builder
+from resdepth_colmap.training.thin_objects import FURNITURE, THIN
+
+_ROWS: tuple[Builder, ...] = (objects.books, objects.pile)
+_BEHIND_TABLES: tuple[Builder, ...] = (
+    thin_objects.lattice,
+    objects.chair,
+    objects.shelf,
+    thin_objects.plant,
+    thin_objects.easel,
+)
+
+
+def _any(rng: Rng, builders: Sequence[Builder]) -> Mesh:
+    return builders[int(rng.integers(len(builders)))](rng)
+
+
+def _any_turn(rng: Rng) -> Matrix:
+    return meshes.turn_z(rng.uniform(0, 2 * np.pi))
+
+
+def fill_room(furnisher: Furnisher, low: Matrix, high: Matrix) -> Matrix:
+    """Put furniture and clutter on the floor, crowded round a focus.
+
+    Args:
+        furnisher: Takes them.
+        low: Lower corner of the room, shape (3,), metres.
+        high: Upper corner.
+
+    Returns:
+        The focus, shape (3,); the camera looks at it roughly along +y.
+    """
+    rng = furnisher.rng
+    depth = rng.uniform(-0.1, 0.5) * high[1]
+    focus = np.array([rng.uniform(-0.3, 0.3) * high[0], depth, rng.uniform(0.4, 0.9)])
+    kinds = (*FURNITURE, *FURNITURE, *THIN, objects.pile)
+    for _ in range(int(rng.integers(7, 20))):
+        thing = _any(rng, kinds)
+        place = _spot(rng, focus, low, high)
+        furnisher.add(thing.moved([*place, 0], _any_turn(rng)))
+        if thing.size[2] < 1.2 and rng.random() < 0.6:
+            _put_on_top(furnisher, place, float(thing.size[2]))
+    for _ in range(int(rng.integers(5, 25))):
+        thing = _any(rng, SMALL if rng.random() < 0.6 else THIN)
+        place = _spot(rng, focus, low, high)
+        furnisher.add(thing.moved([*place, 0], _any_turn(rng)))
+    return focus
+
+
+def _put_on_top(furnisher: Furnisher, place: Matrix, height: float) -> None:
+    rng = furnisher.rng
+    for _ in range(int(rng.integers(1, 6))):
+        x, y = place + rng.normal(0, 0.15, 2)
+        furnisher.add(objects.small_thing(rng).moved([x, y, height * 0.99]))
+
+
+def _spot(rng: Rng, focus: Matrix, low: Matrix, high: Matrix) -> Matrix:
+    """A place on the floor (2,), seldom on the camera's side of the focus."""
+    x, y = focus[:2] + rng.normal(0, 0.9, 2)
+    y = max(y, focus[1] - rng.uniform(0.2, 1.3))
+    return np.asarray(np.clip([x, y], low[:2] + 0.25, high[:2] - 0.25))
+
+
+def lay_table(furnisher: Furnisher) -> Matrix:
+    """A slab with props, and mostly a board or a cloth behind them.
+
+    Returns:
+        The middle of the props, shape (3,), metres.
+    """
+    rng = furnisher.rng
+    top, width, depth = rng.uniform([0.4, 1.2, 0.8], [0.9, 2.6, 1.6])
+    slab = meshes.box([width, depth, 0.04], cell=0.06)
+    furnisher.add(slab.moved([0, 0, top - 0.04]), large=bool(rng.random() < 0.7))
+    for x in (-0.45 * width, 0.45 * width):
+        leg = meshes.box([0.08, depth * 0.9, top - 0.05])
+        furnisher.add(leg.moved([x, 0, 0]))
+    _add_backdrop(furnisher, depth / 2 + rng.uniform(0.0, 0.5), top)
+    for _ in range(int(rng.integers(0, 5))):
+        x, y = rng.uniform([-0.6 * width, depth / 2 + 0.2], [0.6 * width, depth + 0.5])
+        thing = _any(rng, _BEHIND_TABLES)
+        furnisher.add(thing.moved([x, y, 0], _any_turn(rng)))
+    for _ in range(int(rng.integers(8, 36))):
+        x, y = rng.uniform(-0.5, 0.5, 2) * [width * 0.85, depth * 0.9]
+        raised = rng.uniform(0, 0.3) if rng.random() < 0.08 else 0.0
+        prop, turn = _prop(rng)
+        furnisher.add(prop.moved([x, y, top + raised], turn))
+    y, z = rng.uniform([-0.1 * depth, top + 0.05], [0.2 * depth, top + 0.25])
+    return np.array([0.0, y, z])
+
+
+def _prop(rng: Rng) -> tuple[Mesh, Matrix]:
+    """Something of table size, and its turn: half of them roughly face the camera."""
+    pools = (SMALL, SMALL, THIN, _ROWS)
+    thing = _any(rng, pools[int(rng.integers(len(pools)))])
+    limit = rng.uniform(0.25, 0.8)
+    thing = thing.scaled(min(1.0, limit / float(thing.size.max())))
+    frontal = rng.random() < 0.5
+    return thing, meshes.turn_z(rng.normal(0, 0.5)) if frontal else _any_turn(rng)
+
+
+def _add_backdrop(furnisher: Furnisher, behind: float, top: float) -> None:
+    rng = furnisher.rng
+    kind = rng.random()
+    if kind < 0.5:
+        lean = rng.normal(0, 0.15)
+        c, s = np.cos(lean), np.sin(lean)
+        turn = np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+        turn = meshes.turn_z(rng.normal(0, 0.2)) @ turn
+        board = meshes.box(rng.uniform([0.8, 0.02, 0.5], [2.5, 0.03, 1.3]), 0.12)
+        furnisher.add(board.moved([rng.normal(0, 0.2), behind, top], turn), large=True)
+    elif kind < 0.75:
+        curtain = thin_objects.curtain(rng)
+        place = [rng.normal(0, 0.3), behind, top * 0.5]
+        furnisher.add(curtain.moved(place), large=True)
+
+
+def hang_things(furnisher: Furnisher, focus: Matrix, low: Matrix, high: Matrix) -> None:
+    """Put things in the air, in some scenes: depth there knows no floor.
+
+    Args:
+        furnisher: Takes them.
+        focus: Where they are about, shape (3,), metres.
+        low: Lower corner of the room, shape (3,), metres.
+        high: Upper corner.
+    """
+    rng = furnisher.rng
+    count = int(rng.integers(1, 9)) if rng.random() < 0.4 else 0
+    for _ in range(count):
+        thing = _any(rng, THIN if rng.random() < 0.5 else SMALL)
+        thing = thing.moved([0, 0, 0], meshes.random_rotation(rng)).seated()
+        free = max(float(high[2] - thing.size[2]), 0.1)
+        place = focus + rng.normal(0, 1, 3) * [0.6, 0.4, 0.5]
+        place[1] = max(place[1], focus[1] - 0.3)
+        place[2] = np.clip(place[2], 0.05, free)
+        furnisher.add(thing.moved(np.clip(place, low + 0.2, high - 0.2)))

@@ -1,0 +1,69 @@
+"""Textures, looked up where rays hit: filtered, so that nothing flickers."""
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from resdepth_colmap.training.textures import Picture
+
+Floats = npt.NDArray[np.float32]
+Indices = npt.NDArray[np.int64]
+
+
+class Atlas:
+    """All textures and their mip levels in one flat array.
+
+    Args:
+        textures: Pictures in 0..1 (sRGB), each (S, S, 3) with S a power of two.
+    """
+
+    def __init__(self, textures: Sequence[Picture]) -> None:  # noqa: D107
+        levels: list[npt.NDArray[np.uint8]] = []
+        most = max(len(picture) for picture in textures).bit_length()
+        self._base = np.zeros((len(textures), most), dtype=np.int64)
+        self._sizes = np.array([len(picture) for picture in textures])
+        total = 0
+        for index, picture in enumerate(textures):
+            level = np.asarray(picture)
+            for step in range(len(picture).bit_length()):
+                self._base[index, step] = total
+                levels.append(np.round(level * 255).astype(np.uint8).reshape(-1, 3))
+                total += len(levels[-1])
+                half = max(len(level) // 2, 1)
+                smaller = cv2.resize(level, (half, half), interpolation=cv2.INTER_AREA)
+                level = np.asarray(smaller, dtype=np.float32)
+        self._texels = np.concatenate(levels)
+        # what a screen shows to what a surface reflects
+        self._linear = (np.arange(256, dtype=np.float32) / 255) ** 2.2
+
+    def sample(self, texture: Indices, place: Floats, width: Floats) -> Floats:
+        """Colours, bilinear in the nearest mip level.
+
+        Args:
+            texture: Which texture, shape (N,).
+            place: Where, shape (N, 2), in repeats of the texture.
+            width: Side of what a ray sees there, shape (N,), in repeats.
+
+        Returns:
+            Reflected share of the light (linear), shape (N, 3).
+        """
+        full = self._sizes[texture]
+        blur = np.log2(np.maximum(width * full, 1.0))
+        level = np.minimum(
+            np.round(blur).astype(np.int64), np.log2(full).astype(np.int64)
+        )
+        size = full >> level
+        base = self._base[texture, level]
+        xy = (place % 1.0) * size[:, None] - 0.5
+        corner = np.floor(xy).astype(np.int64)
+        share = (xy - corner).astype(np.float32)
+        color = np.zeros((len(place), 3), dtype=np.float32)
+        for dx, wx in ((0, 1 - share[:, 0]), (1, share[:, 0])):
+            x = (corner[:, 0] + dx) & (size - 1)
+            for dy, wy in ((0, 1 - share[:, 1]), (1, share[:, 1])):
+                row = (corner[:, 1] + dy) & (size - 1)
+                texel = self._texels[base + row * size + x]
+                color += (wx * wy)[:, None] * self._linear[texel]
+        return color
