@@ -43,7 +43,9 @@ fix: $(READY)  ## what a tool can mend
 
 bench: $(READY)  ## measure what docs/benchmarks.md reports
 	$(BIN)/python scripts/bench_middlebury.py
+	$(BIN)/python scripts/bench_refine.py
 	$(BIN)/python scripts/bench_workspaces.py
+	$(BIN)/python scripts/make_tables.py
 
 clean:
 	rm -rf $(VENV) demo
