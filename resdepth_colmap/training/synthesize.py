@@ -10,6 +10,7 @@ import numpy as np
 import pycolmap
 
 from resdepth_colmap.config import SynthesisConfig
+from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.io.depth_map import write_depth_map
 from resdepth_colmap.io.images import write_png
 from resdepth_colmap.scene import ColorImage, DepthMap, View
@@ -83,10 +84,7 @@ def write_scene(path: Path, scene: RenderedScene) -> None:
     Raises:
         WorkspaceError: If a file cannot be written.
     """
-    for folder in ("images", "sparse", "ground_truth"):
-        (path / folder).mkdir(parents=True, exist_ok=True)
-    for kind in ("depth_maps", "normal_maps", "consistency_graphs"):
-        (path / "stereo" / kind).mkdir(parents=True, exist_ok=True)
+    _make_folders(path)
     for view, image, depth in zip(scene.views, scene.images, scene.depths, strict=True):
         write_png(path / "images" / view.name, image)
         write_depth_map(path / "ground_truth" / f"{view.name}.bin", depth)
@@ -96,6 +94,17 @@ def write_scene(path: Path, scene: RenderedScene) -> None:
     listing = "".join(f"{name}\n" for name in names)
     (path / "stereo" / "fusion.cfg").write_text(listing, encoding="utf-8")
     _reconstruction(scene).write(path / "sparse")
+
+
+def _make_folders(path: Path) -> None:
+    stereo = ("stereo/depth_maps", "stereo/normal_maps", "stereo/consistency_graphs")
+    try:
+        for folder in ("images", "sparse", "ground_truth", *stereo):
+            (path / folder).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise WorkspaceError(
+            f"{path}: cannot make this folder ({error.strerror}); choose another one."
+        ) from error
 
 
 def _reconstruction(scene: RenderedScene) -> pycolmap.Reconstruction:

@@ -7,6 +7,7 @@ import pycolmap
 import pytest
 
 from resdepth_colmap.config import SynthesisConfig
+from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.io.depth_map import read_depth_map
 from resdepth_colmap.io.images import read_rgb
 from resdepth_colmap.scene import DepthMap, Matrix, View
@@ -134,3 +135,12 @@ def test_finished_rooms_are_kept_and_unfinished_ones_made_anew(tmp_path: Path) -
     assert not leftover.exists()
     assert not (paths[1] / "half").exists()
     assert len(list((paths[1] / "images").iterdir())) == 2
+
+
+def test_a_folder_that_cannot_be_made_is_named(
+    tmp_path: Path, scene: RenderedScene
+) -> None:
+    taken = tmp_path / "taken"
+    taken.touch()
+    with pytest.raises(WorkspaceError, match="taken"):
+        write_scene(taken / "room", scene)
