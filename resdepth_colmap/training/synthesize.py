@@ -178,6 +178,9 @@ def _run(jobs: list[_Job], num_workers: int) -> Iterator[Path]:
     # spawn: a forked child would inherit the threads of open3d half alive
     with multiprocessing.get_context("spawn").Pool(num_workers) as pool:
         yield from pool.imap(_render_into, jobs)
+        # a worker that is told to stop would print a stack (pycolmap's signal handler)
+        pool.close()
+        pool.join()
 
 
 def _render_into(job: _Job) -> Path:

@@ -144,3 +144,16 @@ def test_a_folder_that_cannot_be_made_is_named(
     taken.touch()
     with pytest.raises(WorkspaceError, match="taken"):
         write_scene(taken / "room", scene)
+
+
+@pytest.mark.slow
+def test_many_workers_render_the_same_and_end_quietly(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    config = SynthesisConfig(num_scenes=2, num_views=2, width_px=64, height_px=48)
+    alone = synthesize(tmp_path / "alone", config)
+    together = synthesize(tmp_path / "together", config, num_workers=2)
+    for one, other in zip(alone, together, strict=True):
+        for path in (one / "images").iterdir():
+            assert path.read_bytes() == (other / "images" / path.name).read_bytes()
+    assert capfd.readouterr().err == ""
