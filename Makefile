@@ -14,6 +14,7 @@ $(READY): pyproject.toml constraints.txt
 	  || (echo "Python 3.11 or newer is needed: make PYTHON=python3.11 ..." && false)
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/pip install --quiet --constraint constraints.txt --editable '.[dev]'
+	$(BIN)/python -c 'import open3d' >/dev/null 2>&1 || scripts/install_system_libraries.sh
 	touch $(READY)
 
 demo: $(READY)  ## render a room, match, refine, fuse, and show what changed

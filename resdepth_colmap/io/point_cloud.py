@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from resdepth_colmap.errors import ConfigError, FusionError, WorkspaceError
 from resdepth_colmap.io.files import whole_file
+from resdepth_colmap.io.open3d_library import load_open3d
 
 CLOUD_SUFFIXES = (".ply", ".pcd", ".xyz")
 """Extensions that `write_cloud` knows; .xyz holds coordinates alone."""
@@ -80,7 +81,7 @@ def write_cloud(path: Path, cloud: PointCloud) -> None:
             "allow larger errors (--max-depth-error, --max-reproj-error), or refine "
             "more images."
         )
-    import open3d  # slow import
+    open3d = load_open3d()
 
     tensor_cloud = open3d.t.geometry.PointCloud(_tensor(cloud.points, np.float32))
     tensor_cloud.point.colors = _tensor(cloud.colors, np.uint8)
@@ -112,7 +113,7 @@ def read_cloud(path: Path) -> PointCloud:
         raise ConfigError(f"{path}: clouds are read from .ply, not {path.suffix!r}.")
     if not path.is_file():
         raise WorkspaceError(f"{path}: no such file.")
-    import open3d  # slow import
+    open3d = load_open3d()
 
     with _quiet_open3d():
         tensor_cloud = open3d.t.io.read_point_cloud(path)
@@ -128,13 +129,13 @@ def read_cloud(path: Path) -> PointCloud:
 
 
 def _tensor(values: npt.NDArray[Any], dtype: npt.DTypeLike) -> Any:
-    import open3d  # slow import
+    open3d = load_open3d()
 
     return open3d.core.Tensor.from_numpy(np.ascontiguousarray(values, dtype=dtype))
 
 
 def _quiet_open3d() -> Any:
     """open3d's warnings off the terminal: what matters is raised."""
-    import open3d  # slow import
+    open3d = load_open3d()
 
     return open3d.utility.VerbosityContextManager(open3d.utility.VerbosityLevel.Error)

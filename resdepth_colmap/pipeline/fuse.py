@@ -14,6 +14,7 @@ from resdepth_colmap.config import FuseConfig, Fuser
 from resdepth_colmap.errors import ConfigError, FusionError
 from resdepth_colmap.geometry.view_selection import choose_sources
 from resdepth_colmap.io.depth_map import read_map_size
+from resdepth_colmap.io.open3d_library import load_open3d
 from resdepth_colmap.io.output import OutputWorkspace
 from resdepth_colmap.io.point_cloud import PointCloud
 from resdepth_colmap.io.workspace import Workspace
@@ -228,7 +229,7 @@ def _thinned(cloud: PointCloud, voxel_size: float) -> PointCloud:
 
 
 def _to_open3d(cloud: PointCloud) -> Any:
-    import open3d  # slow import
+    open3d = load_open3d()
 
     vectors = open3d.utility.Vector3dVector
     converted = open3d.geometry.PointCloud(vectors(cloud.points.astype(np.float64)))

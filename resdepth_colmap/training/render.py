@@ -5,11 +5,13 @@ import dataclasses
 import cv2
 import numpy as np
 import numpy.typing as npt
-import open3d as o3d
 
+from resdepth_colmap.io.open3d_library import load_open3d
 from resdepth_colmap.scene import DepthMap, View
 from resdepth_colmap.training.room import Light, Room
 from resdepth_colmap.training.texture_atlas import Atlas
+
+o3d = load_open3d()
 
 Floats = npt.NDArray[np.float32]
 Indices = npt.NDArray[np.int64]
