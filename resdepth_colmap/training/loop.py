@@ -15,8 +15,9 @@ from resdepth_colmap.errors import TrainingError
 from resdepth_colmap.network.unet import ResDepthNet
 from resdepth_colmap.network.weights import save_weights
 from resdepth_colmap.pipeline.progress import Progress, SilentProgress
-from resdepth_colmap.training.dataset import Batch, CropSampler, prepare_samples
+from resdepth_colmap.training.crops import Batch, CropSampler
 from resdepth_colmap.training.loss import refinement_loss
+from resdepth_colmap.training.samples import prepare_samples
 
 logger = logging.getLogger(__name__)
 

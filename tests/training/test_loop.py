@@ -11,8 +11,9 @@ from resdepth_colmap.config import NetworkConfig, TrainConfig
 from resdepth_colmap.errors import TrainingError
 from resdepth_colmap.io.depth_map import read_depth_map, write_depth_map
 from resdepth_colmap.network.weights import load_weights
-from resdepth_colmap.training.dataset import CropSampler, prepare_samples
+from resdepth_colmap.training.crops import CropSampler
 from resdepth_colmap.training.loop import train
+from resdepth_colmap.training.samples import prepare_samples
 
 NETWORK = NetworkConfig(levels=3, base_channels=4, max_channels=8)
 TRAINING = TrainConfig(steps=4, batch_size=2, crop_px=32, checkpoint_steps=2)
