@@ -5,6 +5,7 @@ view and kept in a cache folder: the network's inputs are then only read and cut
 """
 
 import hashlib
+import io
 import json
 from collections.abc import Sequence
 from pathlib import Path
@@ -182,8 +183,6 @@ def _with_holes(depth: DepthMap, sample: Sample, config: NetworkConfig) -> Depth
 
 
 def _write_sample(path: Path, sample: Sample) -> None:
-    import io
-
     buffer = io.BytesIO()
     np.savez(buffer, **sample._asdict())
     write_whole(path, buffer.getvalue())
