@@ -5,7 +5,7 @@ from pathlib import Path
 import torch
 from planes import write_plane_workspace
 
-from resdepth_colmap.config import NetworkConfig
+from resdepth_colmap.network.network_config import NetworkConfig
 from resdepth_colmap.network.unet import ResDepthNet
 from resdepth_colmap.network.weights import save_weights
 

@@ -6,7 +6,8 @@ from typing import Any
 import click
 
 from resdepth_colmap.cli.options import build_config, command, config_options
-from resdepth_colmap.config import NetworkConfig, TrainConfig
+from resdepth_colmap.config import TrainConfig
+from resdepth_colmap.network.network_config import NetworkConfig
 
 
 @command(

@@ -5,7 +5,7 @@ from typing import NamedTuple, cast
 import torch
 from torch import Tensor, nn
 
-from resdepth_colmap.config import NetworkConfig
+from resdepth_colmap.network.network_config import NetworkConfig
 
 INPUT_LIMIT = 8.0
 """The convolutions see the normalised inverse depth clamped to plus or minus this."""

@@ -19,9 +19,9 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import save as to_bytes
 from torch import Tensor
 
-from resdepth_colmap.config import NetworkConfig
 from resdepth_colmap.errors import ConfigError, WeightsError
 from resdepth_colmap.io.files import write_whole
+from resdepth_colmap.network.network_config import NetworkConfig
 from resdepth_colmap.network.unet import ResDepthNet
 
 FORMAT = "resdepth-colmap"

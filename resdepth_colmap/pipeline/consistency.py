@@ -93,12 +93,12 @@ def fuse_views(
         reference = views[index]
         present = np.flatnonzero(reference.depth > 0)
         present = present[reference.is_trusted(present, config.min_confidence)]
-        todo = present[~explained.of(index, reference.depth.size)[present]]
+        pending = present[~explained.of(index, reference.depth.size)[present]]
         statistics = statistics.plus(
-            num_pixels=present.size, num_explained=present.size - todo.size
+            num_pixels=present.size, num_explained=present.size - pending.size
         )
-        for start in range(0, todo.size, _PIXELS_AT_ONCE):
-            chunk = _Chunk(reference, todo[start : start + _PIXELS_AT_ONCE], config)
+        for start in range(0, pending.size, _PIXELS_AT_ONCE):
+            chunk = _Chunk(reference, pending[start : start + _PIXELS_AT_ONCE], config)
             for other in neighbours[index]:
                 chunk.compare(other, views[other])
             kept = chunk.num_agreeing >= needed

@@ -11,10 +11,10 @@ import torch
 from torch import Tensor
 from torch.nn.functional import avg_pool2d
 
-from resdepth_colmap.config import NetworkConfig, Normalisation
 from resdepth_colmap.geometry.holes import fill_holes
 from resdepth_colmap.geometry.inverse_depth import invert_map
 from resdepth_colmap.geometry.warp import warp_to_reference
+from resdepth_colmap.network.network_config import NetworkConfig, Normalisation
 from resdepth_colmap.scene import DepthMap
 
 NCC_WINDOW_PX = 7

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from resdepth_colmap.config import NetworkConfig, RefineConfig
+from resdepth_colmap.config import RefineConfig
 from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.geometry.pixels import index_K
 from resdepth_colmap.geometry.view_selection import SourceChoice
@@ -16,6 +16,7 @@ from resdepth_colmap.io.model import read_scene
 from resdepth_colmap.io.output import OutputWorkspace, read_record, write_record
 from resdepth_colmap.io.workspace import Workspace
 from resdepth_colmap.network.device import resolve_device
+from resdepth_colmap.network.network_config import NetworkConfig
 from resdepth_colmap.network.unet import ResDepthNet
 from resdepth_colmap.network.weights import load_weights, weights_hash
 from resdepth_colmap.pipeline.initial_map import (
@@ -156,18 +157,18 @@ class _Loop:
     ) -> tuple[list[str], list[str], list[tuple[str, str]]]:
         """Refined, kept, and those that turned out to have nothing to refine."""
         known = dict(self.record.get(RECORD_KEY, {}))
-        todo = []
+        pending = []
         for plan in plans:
             name = self.scene.views[plan.index].name
             if not overwrite and self._is_finished(name, plan, known):
                 self.images[name] = known[name]
             else:
-                todo.append(plan)
+                pending.append(plan)
         kept, refined, empty = list(self.images), [], []
         # A record must never vouch for maps that are about to be replaced.
         self._save()
-        with progress.stage("Refining", len(todo)) as advance:
-            for plan in todo:
+        with progress.stage("Refining", len(pending)) as advance:
+            for plan in pending:
                 name = self.scene.views[plan.index].name
                 reason = self._refine(plan)
                 if reason:

@@ -135,22 +135,22 @@ def _run_cpu(
 ) -> StereoReport:
     plans, skipped = plan_sources(workspace, scene, config)
     ledger = StereoLedger(workspace)
-    todo, kept = [], []
+    pending, kept = [], []
     for index, sources in plans.items():
         view = scene.views[index]
         fingerprint = stereo_fingerprint(workspace, scene, index, sources, config)
         if not overwrite and ledger.is_kept(view.name, fingerprint):
             kept.append(view.name)
         else:
-            todo.append((index, sources, fingerprint))
-    if todo:
+            pending.append((index, sources, fingerprint))
+    if pending:
         logger.info("Compiling the matcher: up to a minute, once on a machine.")
     matched = []
     # A view with its sources, and as many that the next view may share.
     images = ViewImages(workspace, 2 * (1 + config.max_num_sources))
     ledger.start()
-    with progress.stage("PatchMatch", len(todo)) as advance:
-        for index, sources, fingerprint in todo:
+    with progress.stage("PatchMatch", len(pending)) as advance:
+        for index, sources, fingerprint in pending:
             view = scene.views[index]
             result = _match(scene, index, sources, config, images, advance)
             ledger.add(view.name, UNFINISHED)

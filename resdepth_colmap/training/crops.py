@@ -10,8 +10,8 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from resdepth_colmap.config import NetworkConfig
 from resdepth_colmap.errors import TrainingError
+from resdepth_colmap.network.network_config import NetworkConfig
 from resdepth_colmap.pipeline.inputs import InputStack, network_input
 from resdepth_colmap.training.samples import Sample, read_sample
 

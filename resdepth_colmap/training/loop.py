@@ -10,8 +10,9 @@ from typing import NamedTuple
 
 import torch
 
-from resdepth_colmap.config import NetworkConfig, TrainConfig
+from resdepth_colmap.config import TrainConfig
 from resdepth_colmap.errors import TrainingError
+from resdepth_colmap.network.network_config import NetworkConfig
 from resdepth_colmap.network.unet import ResDepthNet
 from resdepth_colmap.network.weights import save_weights
 from resdepth_colmap.pipeline.progress import Progress, SilentProgress

@@ -16,7 +16,6 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from resdepth_colmap.config import NetworkConfig
 from resdepth_colmap.errors import TrainingError
 from resdepth_colmap.geometry.pixels import index_K
 from resdepth_colmap.geometry.view_selection import choose_sources
@@ -25,6 +24,7 @@ from resdepth_colmap.io.files import write_whole
 from resdepth_colmap.io.images import read_gray
 from resdepth_colmap.io.model import read_scene
 from resdepth_colmap.io.workspace import Workspace, open_workspace
+from resdepth_colmap.network.network_config import NetworkConfig
 from resdepth_colmap.pipeline.inputs import (
     SourceTensors,
     ViewTensors,

@@ -1,7 +1,7 @@
 import pytest
 import torch
 
-from resdepth_colmap.config import InputVariant, NetworkConfig
+from resdepth_colmap.network.network_config import InputVariant, NetworkConfig
 from resdepth_colmap.network.unet import INPUT_LIMIT, ResDepthNet
 
 

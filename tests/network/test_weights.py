@@ -7,9 +7,9 @@ import torch
 from safetensors.torch import load_file, save_file
 from torch import Tensor
 
-from resdepth_colmap.config import NetworkConfig
 from resdepth_colmap.errors import WeightsError
 from resdepth_colmap.network import weights
+from resdepth_colmap.network.network_config import NetworkConfig
 from resdepth_colmap.network.unet import ResDepthNet
 from resdepth_colmap.network.weights import (
     load_weights,

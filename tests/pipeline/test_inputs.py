@@ -5,8 +5,12 @@ import pytest
 import torch
 from analytic_scene import Pair, plane_pair, sphere_pair
 
-from resdepth_colmap.config import InputVariant, NetworkConfig, Normalisation
 from resdepth_colmap.geometry.inverse_depth import inverse_depth
+from resdepth_colmap.network.network_config import (
+    InputVariant,
+    NetworkConfig,
+    Normalisation,
+)
 from resdepth_colmap.pipeline.inputs import (
     InputStack,
     SourceTensors,

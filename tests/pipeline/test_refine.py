@@ -13,13 +13,13 @@ from analytic_scene import (
 from hypothesis import given
 from hypothesis import strategies as st
 
-from resdepth_colmap.config import (
+from resdepth_colmap.config import RefineConfig
+from resdepth_colmap.geometry.pixels import index_K
+from resdepth_colmap.network.network_config import (
     InputVariant,
     NetworkConfig,
     Normalisation,
-    RefineConfig,
 )
-from resdepth_colmap.geometry.pixels import index_K
 from resdepth_colmap.network.unet import ResDepthNet
 from resdepth_colmap.pipeline.refine import (
     RefinedView,

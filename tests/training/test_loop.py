@@ -7,9 +7,10 @@ import pytest
 import torch
 from planes import write_plane_workspace
 
-from resdepth_colmap.config import NetworkConfig, TrainConfig
+from resdepth_colmap.config import TrainConfig
 from resdepth_colmap.errors import TrainingError
 from resdepth_colmap.io.depth_map import read_depth_map, write_depth_map
+from resdepth_colmap.network.network_config import NetworkConfig
 from resdepth_colmap.network.weights import load_weights
 from resdepth_colmap.training.crops import CropSampler
 from resdepth_colmap.training.loop import train

@@ -1,0 +1,114 @@
+"""What the network looks like, what it sees and what it says."""
+
+import dataclasses
+import enum
+from typing import Self
+
+from resdepth_colmap.config import Config
+
+
+class InputVariant(enum.StrEnum):
+    """What the network sees (paper, section "Network Variants")."""
+
+    STEREO = "stereo"
+    MONO = "mono"
+    DEPTH_ONLY = "depth-only"
+    IMAGES_ONLY = "images-only"
+
+
+class Normalisation(enum.StrEnum):
+    """How a tile's inverse depth is scaled before the network sees it."""
+
+    BASELINE = "baseline"  # the paper's: times the baseline, minus the tile's mean
+    ROBUST = "robust"  # minus the tile's median, over half its 10-90 % spread
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class NetworkConfig(Config):
+    """The U-Net (paper, section "Network Architecture").
+
+    Attributes:
+        levels: Down-sampling levels; 7 for tiles of 512 px, 5 for tiles of 128 px.
+        base_channels: Channels of the first level; they double with each level.
+        max_channels: Where the doubling stops.
+        variant: What the network sees.
+        num_sources: Warped second views (variants stereo and images-only).
+        valid: Give it the mask of pixels whose depth was real, not filled.
+        photo_consistency: Give it the local correlation of reference and warped view.
+        gate: Let it weigh its residual by a learned gate in 0..1.
+        last_block: One more convolution block at full resolution, before the last
+            convolution: lets it weigh fine structure by what surrounds it.
+        confidence: Let it predict the scale of its own error.
+        normalisation: How inverse depth is scaled.
+    """
+
+    levels: int = 7
+    base_channels: int = 16
+    max_channels: int = 512
+    variant: InputVariant = InputVariant.STEREO
+    num_sources: int = 1
+    valid: bool = True
+    photo_consistency: bool = True
+    gate: bool = True
+    last_block: bool = True
+    confidence: bool = True
+    normalisation: Normalisation = Normalisation.ROBUST
+
+    def __post_init__(self) -> None:
+        """Turn plain strings into their enums and check the ranges."""
+        for name, kind in (("variant", InputVariant), ("normalisation", Normalisation)):
+            value = getattr(self, name)
+            choices = [str(choice) for choice in kind]
+            self._check(value in choices, " or ".join(choices), **{name: value})
+            object.__setattr__(self, name, kind(value))
+        self._check(1 <= self.levels <= 9, "1 to 9", levels=self.levels)
+        self._check(
+            1 <= self.base_channels <= self.max_channels <= 1024,
+            "1 <= base_channels <= max_channels <= 1024",
+            base_channels=self.base_channels,
+            max_channels=self.max_channels,
+        )
+        self._check(1 <= self.num_sources <= 8, "1 to 8", num_sources=self.num_sources)
+
+    @classmethod
+    def paper(cls, variant: InputVariant = InputVariant.STEREO) -> Self:
+        """The network of the paper: 64 to 512 channels, no extra inputs or outputs."""
+        return cls(
+            base_channels=64,
+            variant=variant,
+            valid=False,
+            gate=False,
+            last_block=False,
+            photo_consistency=False,
+            confidence=False,
+            normalisation=Normalisation.BASELINE,
+        )
+
+    @property
+    def uses_sources(self) -> bool:
+        """Whether warped second views are among the inputs."""
+        return self.variant in (InputVariant.STEREO, InputVariant.IMAGES_ONLY)
+
+    @property
+    def residual(self) -> bool:
+        """Whether the output is added to the initial inverse depth."""
+        return self.variant is not InputVariant.IMAGES_ONLY
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the input channels, in order."""
+        names = ["inverse_depth"] if self.residual else []
+        if self.variant is not InputVariant.DEPTH_ONLY:
+            names.append("reference")
+        if self.uses_sources:
+            names += [f"source_{index}" for index in range(self.num_sources)]
+        if self.valid:
+            names.append("valid")
+        if self.photo_consistency and self.uses_sources:
+            names.append("photo_consistency")
+        return tuple(names)
+
+    @property
+    def multiple_px(self) -> int:
+        """Input height and width must be multiples of this."""
+        return int(2**self.levels)
