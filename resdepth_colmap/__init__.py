@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from resdepth_colmap.io.workspace import Workspace, open_workspace
     from resdepth_colmap.network.weights import load_weights
     from resdepth_colmap.pipeline.fuse import fuse_workspace
-    from resdepth_colmap.pipeline.refine import refine_view
+    from resdepth_colmap.pipeline.refine import SourceView, ViewInputs, refine_view
     from resdepth_colmap.pipeline.refine_workspace import refine_workspace
     from resdepth_colmap.pipeline.run import run_refine
     from resdepth_colmap.pipeline.run_config import RunConfig
@@ -29,8 +29,10 @@ __all__ = [
     "ResDepthError",
     "RunConfig",
     "Scene",
+    "SourceView",
     "StereoConfig",
     "View",
+    "ViewInputs",
     "Workspace",
     "fuse_workspace",
     "load_weights",
@@ -47,8 +49,10 @@ _MODULE_OF = {
     "ResDepthError": "errors",
     "RunConfig": "pipeline.run_config",
     "Scene": "scene",
+    "SourceView": "pipeline.refine",
     "StereoConfig": "config",
     "View": "scene",
+    "ViewInputs": "pipeline.refine",
     "Workspace": "io.workspace",
     "fuse_workspace": "pipeline.fuse",
     "load_weights": "network.weights",
