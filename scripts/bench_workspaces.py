@@ -25,7 +25,7 @@ CASES: dict[str, tuple[str, list[str]]] = {
     "meeting_room": ("meeting_room", []),
     "plant-photometric": ("plant", ["--input", "photometric"]),
     "plant-geometric": ("plant", ["--input", "geometric"]),
-    "walnut": ("walnut", ["--stereo", "cpu"]),
+    "walnut": ("walnut", ["--stereo", "cpu", "--max-image-size", "800"]),
     "castle_photos": ("castle_photos", ["--max-image-size", "1000"]),
 }
 

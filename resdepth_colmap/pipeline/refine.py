@@ -36,6 +36,13 @@ CONFIDENT_ERROR = 0.01
 LOG_SCALE_LIMIT = 12.0
 
 
+KEPT_CONSISTENCY = 0.15
+"""Photo-consistency (NCC of 0.7) up to which the photographs confirm a depth."""
+
+KEPT_CHANGE = 0.05
+"""Relative change that is no correction of an outlier: a confirmed depth stays."""
+
+
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class SourceView:
     """A second view.
@@ -99,7 +106,9 @@ def refine_view(
     """Refine a depth map: fill, warp, run the network tile by tile, and again.
 
     Each pass warps the sources anew with the depth of the pass before. The mask of real
-    pixels stays that of the first: it tells the network what was measured.
+    pixels stays that of the first: it tells the network what was measured. A measured
+    depth that the photographs confirm is kept where the network would change it by less
+    than 5 %: matching is more exact there than the network (docs/adr/0006).
 
     Args:
         view: Initial depth, images and poses; sources that the network does not take
@@ -119,10 +128,14 @@ def refine_view(
         measured = tensors.inverse_depth[tensors.valid]
         low = float(measured.min()) * LEAST_INVERSE_RATIO
         high = float(measured.max()) * LARGEST_INVERSE_RATIO
+        confirmed = _confirmed(tensors, config)
+        initial = tensors.inverse_depth
         for _ in range(config.passes):
             stack = build_inputs(tensors, network.config)
             outputs = _run_tiled(stack, network, config).to(device)[None]
             refined = (tensors.inverse_depth + outputs[:, :1]).clamp(low, high)
+            little = (refined - initial).abs() < KEPT_CHANGE * initial
+            refined = torch.where(confirmed & little, initial, refined)
             tensors = tensors._replace(inverse_depth=refined)
         if network.config.confidence:
             error = outputs[:, 1:2]
@@ -205,6 +218,15 @@ def _tensors(view: ViewInputs, device: torch.device) -> ViewTensors:
 
 def _image(gray: GrayImage, device: torch.device) -> Tensor:
     return torch.from_numpy(np.array(gray, dtype=np.float32))[None, None].to(device)
+
+
+def _confirmed(tensors: ViewTensors, config: RefineConfig) -> Tensor:
+    """Where the initial depth is real and a source shows the same, (B, 1, H, W)."""
+    if not config.keep_confirmed or not tensors.sources:
+        return torch.zeros_like(tensors.valid)
+    warped = warp_sources(tensors, 1)
+    is_good = photo_consistency(tensors.gray, warped) < KEPT_CONSISTENCY
+    return is_good & tensors.valid
 
 
 def _correlation(tensors: ViewTensors, num_sources: int) -> Tensor:

@@ -210,3 +210,37 @@ def test_a_depth_map_without_any_depth_is_refused() -> None:
     empty = dataclasses.replace(initial, depth=np.zeros_like(initial.depth))
     with pytest.raises(ValueError, match="no pixel"):
         refine_view(empty, network(), TILES)
+
+
+def test_what_the_photographs_confirm_stays_and_outliers_do_not() -> None:
+    initial = view()
+    exact = depth_of_plane(two_views()[0], PLANE_NORMAL, PLANE_OFFSET)
+    wrong = np.zeros(exact.shape, bool)
+    wrong[10:20, 10:20] = True
+    depth = np.where(wrong, 0.5 * exact, exact).astype(np.float32)
+    initial = dataclasses.replace(initial, depth=depth)
+    net = network(seed=1)
+    with_rule = refine_view(initial, net, TILES).depth
+    without = refine_view(
+        initial, net, dataclasses.replace(TILES, keep_confirmed=False)
+    ).depth
+    kept = np.isclose(with_rule, depth, rtol=1e-6)
+    changed = ~np.isclose(with_rule, without, rtol=1e-6)
+    assert kept.mean() > 2 * np.isclose(without, depth, rtol=1e-6).mean()
+    # What the rule changed, it set back to the initial depth, by less than 5 %.
+    assert kept[changed].all()
+    assert (np.abs(1 / without - 1 / depth)[changed] < 0.05 / depth[changed]).all()
+
+
+def test_a_hole_is_never_confirmed() -> None:
+    initial = view()
+    exact = depth_of_plane(two_views()[0], PLANE_NORMAL, PLANE_OFFSET)
+    depth = np.where(initial.depth > 0, exact, 0.0).astype(np.float32)
+    initial = dataclasses.replace(initial, depth=depth)
+    net = network(seed=1)
+    with_rule = refine_view(initial, net, TILES).depth
+    without = refine_view(
+        initial, net, dataclasses.replace(TILES, keep_confirmed=False)
+    ).depth
+    holes = initial.depth == 0
+    np.testing.assert_array_equal(with_rule[holes], without[holes])
