@@ -78,3 +78,11 @@ def test_every_depth_gets_a_unit_normal_towards_the_camera(
     lengths = np.linalg.norm(normals, axis=-1)
     np.testing.assert_allclose(lengths, depth > 0, atol=1e-5)
     assert (normals[depth > 0][:, 2] < 0).all()
+
+
+def test_noise_of_a_few_per_mille_turns_normals_by_a_few_degrees() -> None:
+    view = two_views()[0]
+    noise = np.random.default_rng(0).normal(0.0, 0.003, plane_depth(view).shape)
+    noisy = (plane_depth(view) * (1.0 + noise)).astype(np.float32)
+    cosine = normals_from_depth(noisy, K) @ expected_normal(view)
+    assert np.degrees(np.arccos(np.median(cosine))) < 3.0
