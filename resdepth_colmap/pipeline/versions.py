@@ -3,6 +3,7 @@
 import importlib.metadata
 import platform
 import sys
+from pathlib import Path
 
 PACKAGES = ("resdepth-colmap", "torch", "pycolmap", "open3d", "numpy")
 _INSTEAD = {"pycolmap": ("pycolmap-cuda12",), "open3d": ("open3d-cpu",)}
@@ -21,14 +22,22 @@ def versions() -> dict[str, str]:
 
 
 def peak_memory_mb() -> float | None:
-    """Most memory that this process has used so far, in MiB; None on Windows."""
-    if sys.platform == "win32":
-        return None
-    import resource  # not on Windows
+    """Most memory that this process had at once, in MiB; None where unknown.
 
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    # Linux counts in KiB, macOS in bytes.
-    return peak / 1024 if sys.platform != "darwin" else peak / 1024**2
+    Linux's own count begins with the program; that of getrusage is inherited from the
+    process that started it.
+    """
+    status = Path("/proc/self/status")
+    if status.exists():
+        for line in status.read_text(encoding="ascii", errors="replace").splitlines():
+            if line.startswith("VmHWM:"):
+                return float(line.split()[1]) / 1024
+    try:
+        import resource
+    except ImportError:  # Windows
+        return None
+    peak = float(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+    return peak / (1024**2 if sys.platform == "darwin" else 1024)
 
 
 def _version(package: str) -> str:
