@@ -39,6 +39,9 @@ LOG_SCALE_LIMIT = 12.0
 KEPT_CONSISTENCY = 0.15
 """Photo-consistency (NCC of 0.7) up to which the photographs confirm a depth."""
 
+FILTERED_SHARE = 0.95
+"""A map with less of its pixels filled has been filtered."""
+
 KEPT_CHANGE = 0.05
 """Relative change that is no correction of an outlier: a confirmed depth stays."""
 
@@ -221,8 +224,16 @@ def _image(gray: GrayImage, device: torch.device) -> Tensor:
 
 
 def _confirmed(tensors: ViewTensors, config: RefineConfig) -> Tensor:
-    """Where the initial depth is real and a source shows the same, (B, 1, H, W)."""
-    if not config.keep_confirmed or not tensors.sources:
+    """Where the initial depth is real and its filter or a source vouches for it.
+
+    Shape (B, 1, H, W), bool. A map with holes was filtered: what its filter left was
+    consistent over several views, which says more than one second view can.
+    """
+    if not config.keep_confirmed:
+        return torch.zeros_like(tensors.valid)
+    if float(tensors.valid.float().mean()) < FILTERED_SHARE:
+        return tensors.valid
+    if not tensors.sources:
         return torch.zeros_like(tensors.valid)
     warped = warp_sources(tensors, 1)
     is_good = photo_consistency(tensors.gray, warped) < KEPT_CONSISTENCY

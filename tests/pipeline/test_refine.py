@@ -244,3 +244,18 @@ def test_a_hole_is_never_confirmed() -> None:
     ).depth
     holes = initial.depth == 0
     np.testing.assert_array_equal(with_rule[holes], without[holes])
+
+
+def test_what_a_filter_left_stays_where_it_is_changed_a_little() -> None:
+    initial = dataclasses.replace(view(), sources=())  # nothing to confirm it by
+    net = network(seed=1)
+    with_rule = refine_view(initial, net, TILES).depth
+    without = refine_view(
+        initial, net, dataclasses.replace(TILES, keep_confirmed=False)
+    ).depth
+    measured = initial.depth > 0
+    safe = np.where(measured, initial.depth, 1.0)
+    little = measured & (np.abs(1 / without - 1 / safe) < 0.0499 / safe)
+    assert little.any()
+    np.testing.assert_allclose(with_rule[little], initial.depth[little], rtol=1e-6)
+    np.testing.assert_array_equal(with_rule[~measured], without[~measured])
