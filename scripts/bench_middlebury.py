@@ -34,18 +34,25 @@ def main() -> None:
     )
     parser.add_argument("--weights", type=Path)
     parser.add_argument("--passes", type=int, default=RefineConfig.passes)
+    parser.add_argument("--no-keep-confirmed", action="store_true")
     parser.add_argument("--cache", type=Path, help="keeps matched depth maps")
     parser.add_argument("--output", type=Path, default=RESULT)
     arguments = parser.parse_args()
     report = measure_middlebury(
         Path(arguments.data) / "middlebury",
-        RefineConfig(passes=arguments.passes, weights=arguments.weights),
+        RefineConfig(
+            passes=arguments.passes,
+            keep_confirmed=not arguments.no_keep_confirmed,
+            weights=arguments.weights,
+        ),
         cache=MatchCache(folder=arguments.cache) if arguments.cache else None,
         on_scene=show,
     )
     command = "python scripts/bench_middlebury.py"
     if arguments.passes != RefineConfig.passes:
         command += f" --passes {arguments.passes}"
+    if arguments.no_keep_confirmed:
+        command += " --no-keep-confirmed"
     measured = {"command": command, **report.to_mapping()}
     arguments.output.parent.mkdir(parents=True, exist_ok=True)
     arguments.output.write_text(json.dumps(measured, indent=2) + "\n", "utf-8")

@@ -1,4 +1,4 @@
-"""Render rooms and match them: the data that the shipped weights were trained on.
+"""Render rooms and match them: data of the kind that the weights are trained on.
 
     python scripts/make_training_data.py rooms --num-scenes 300 --workers 2
 

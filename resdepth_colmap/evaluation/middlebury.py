@@ -31,6 +31,8 @@ from resdepth_colmap.pipeline.versions import versions
 
 _WARM_UP_PX = 32
 
+_OPTIONS = ("passes", "keep_confirmed", "tile_px", "overlap_px")
+
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class SceneResult:
@@ -111,7 +113,7 @@ class MiddleburyReport:
             "date": self.date.isoformat(),
             "weights_sha256": self.weights_sha256,
             "options": {
-                "refine": {k: refine[k] for k in ("passes", "tile_px", "overlap_px")},
+                "refine": {name: refine[name] for name in _OPTIONS},
                 "stereo": self.stereo.to_mapping(),
             },
             "versions": self.versions,

@@ -27,7 +27,7 @@ from resdepth_colmap.pipeline.refine import (
     ViewInputs,
     refine_view,
 )
-from resdepth_colmap.scene import cam_from_cam
+from resdepth_colmap.scene import DepthMap, cam_from_cam
 
 SMALL = {"levels": 2, "base_channels": 4, "max_channels": 8}
 TILES = RefineConfig(tile_px=32, overlap_px=8)
@@ -67,6 +67,15 @@ def network(seed: int | None = None, **options: object) -> ResDepthNet:
     if seed is not None:
         torch.nn.init.normal_(net.head.weight, std=0.05)
     return net
+
+
+def with_and_without_rule(initial: ViewInputs) -> tuple[DepthMap, DepthMap]:
+    """The depth that a network gives that changes much, with the rule and without."""
+    net = network(seed=1)
+    without = dataclasses.replace(TILES, keep_confirmed=False)
+    configs = (TILES, without)
+    first, second = (refine_view(initial, net, config).depth for config in configs)
+    return first, second
 
 
 def check(refined: RefinedView, shape: tuple[int, ...]) -> None:
@@ -219,11 +228,7 @@ def test_what_the_photographs_confirm_stays_and_outliers_do_not() -> None:
     wrong[10:20, 10:20] = True
     depth = np.where(wrong, 0.5 * exact, exact).astype(np.float32)
     initial = dataclasses.replace(initial, depth=depth)
-    net = network(seed=1)
-    with_rule = refine_view(initial, net, TILES).depth
-    without = refine_view(
-        initial, net, dataclasses.replace(TILES, keep_confirmed=False)
-    ).depth
+    with_rule, without = with_and_without_rule(initial)
     kept = np.isclose(with_rule, depth, rtol=1e-6)
     changed = ~np.isclose(with_rule, without, rtol=1e-6)
     assert kept.mean() > 2 * np.isclose(without, depth, rtol=1e-6).mean()
@@ -237,22 +242,14 @@ def test_a_hole_is_never_confirmed() -> None:
     exact = depth_of_plane(two_views()[0], PLANE_NORMAL, PLANE_OFFSET)
     depth = np.where(initial.depth > 0, exact, 0.0).astype(np.float32)
     initial = dataclasses.replace(initial, depth=depth)
-    net = network(seed=1)
-    with_rule = refine_view(initial, net, TILES).depth
-    without = refine_view(
-        initial, net, dataclasses.replace(TILES, keep_confirmed=False)
-    ).depth
+    with_rule, without = with_and_without_rule(initial)
     holes = initial.depth == 0
     np.testing.assert_array_equal(with_rule[holes], without[holes])
 
 
 def test_what_a_filter_left_stays_where_it_is_changed_a_little() -> None:
     initial = dataclasses.replace(view(), sources=())  # nothing to confirm it by
-    net = network(seed=1)
-    with_rule = refine_view(initial, net, TILES).depth
-    without = refine_view(
-        initial, net, dataclasses.replace(TILES, keep_confirmed=False)
-    ).depth
+    with_rule, without = with_and_without_rule(initial)
     measured = initial.depth > 0
     safe = np.where(measured, initial.depth, 1.0)
     little = measured & (np.abs(1 / without - 1 / safe) < 0.0499 / safe)
