@@ -1,10 +1,10 @@
 """The command `resdepth-colmap`: its commands, log, and what an error looks like."""
 
-import importlib
 from typing import Any
 
 import click
 
+from resdepth_colmap.cli.lazy_group import LazyGroup
 from resdepth_colmap.cli.options import example, verbosity_options
 from resdepth_colmap.errors import ResDepthError
 
@@ -15,26 +15,15 @@ COMMANDS = (
     "fuse",
     "export",
     "info",
+    "evaluate",
     "demo",
     "synthesize",
     "train",
 )
 
 
-class _Commands(click.Group):
-    """One module a command, imported when it is asked for."""
-
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        """The commands, in the order a user meets them."""
-        return list(COMMANDS)
-
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """The command of that name, None if there is none."""
-        if cmd_name not in COMMANDS:
-            return None
-        module = importlib.import_module(f"resdepth_colmap.cli.{cmd_name}")
-        command: click.Command = getattr(module, cmd_name)
-        return command
+class _Program(LazyGroup):
+    """The commands, and what becomes of their errors."""
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command; our own errors are one line, all others are bugs."""
@@ -53,7 +42,9 @@ def _plain_name(token: str) -> str:
 
 
 @click.group(
-    cls=_Commands,
+    cls=_Program,
+    module_prefix="resdepth_colmap.cli.",
+    commands_in=COMMANDS,
     epilog=example("info scene/dense", "refine scene/dense"),
     context_settings={
         "help_option_names": ["-h", "--help"],

@@ -9,23 +9,25 @@ import pytest
 from click.testing import CliRunner, Result
 
 from resdepth_colmap import __version__
+from resdepth_colmap.cli.evaluate import EVALUATIONS
 from resdepth_colmap.cli.main import COMMANDS, main
 from resdepth_colmap.config import RefineConfig
 from resdepth_colmap.errors import WorkspaceError
 
 HEAVY = ("torch", "open3d", "pycolmap", "numba", "cv2", "scipy", "matplotlib", "numpy")
+ALL_COMMANDS = (*COMMANDS, *(f"evaluate {name}" for name in EVALUATIONS))
 
 
 def run(*arguments: str) -> Result:
     return CliRunner().invoke(main, list(arguments))
 
 
-@pytest.mark.parametrize("command", ["", *COMMANDS])
+@pytest.mark.parametrize("command", ["", *ALL_COMMANDS])
 def test_help_imports_no_heavy_module(command: str) -> None:
     code = (
         "import sys\n"
         "from resdepth_colmap.cli.main import main\n"
-        f"main({[command, '--help'] if command else ['--help']}, "
+        f"main({[*command.split(), '--help']}, "
         "standalone_mode=False)\n"
         f"sys.exit(str({{*{HEAVY}}} & set(sys.modules) or ''))"
     )
@@ -44,9 +46,9 @@ def test_help_is_there_in_half_a_second() -> None:
     assert min(seconds) < 0.5
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", ALL_COMMANDS)
 def test_the_help_of_each_command_has_an_example(command: str) -> None:
-    result = run(command, "--help")
+    result = run(*command.split(), "--help")
     assert result.exit_code == 0
     assert f"Example:\n    resdepth-colmap {command}" in result.output or (
         f"resdepth-colmap {command} " in result.output.partition("Example:")[2]
@@ -68,6 +70,7 @@ def test_wrong_usage_has_exit_code_2() -> None:
     assert run("refine", ".", "--device", "abacus").exit_code == 2
     assert run("refine", ".", "--stereo", "glasses").exit_code == 2
     assert run("polish", ".").exit_code == 2
+    assert run("evaluate", "taste", ".").exit_code == 2
 
 
 def test_an_option_out_of_range_is_one_line() -> None:

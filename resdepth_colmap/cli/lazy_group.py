@@ -1,0 +1,42 @@
+"""A group of commands whose modules are imported when they are asked for."""
+
+import importlib
+from typing import Any
+
+import click
+
+
+class LazyGroup(click.Group):
+    """One module a command; help and a wrong name import none of them needlessly."""
+
+    def __init__(
+        self,
+        *args: Any,
+        module_prefix: str,
+        commands_in: tuple[str, ...],
+        **kwargs: Any,
+    ) -> None:
+        """Make a group of commands that are not imported yet.
+
+        Args:
+            args: As those of click's Group.
+            module_prefix: What precedes the name of a command in that of its module.
+            commands_in: Names of the commands, in the order a user meets them; each is
+                an attribute of that name in its module.
+            kwargs: As those of click's Group.
+        """
+        super().__init__(*args, **kwargs)
+        self.module_prefix = module_prefix
+        self.commands_in = commands_in
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """The commands, in the order a user meets them."""
+        return list(self.commands_in)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """The command of that name, None if there is none."""
+        if cmd_name not in self.commands_in:
+            return None
+        module = importlib.import_module(self.module_prefix + cmd_name)
+        command: click.Command = getattr(module, cmd_name)
+        return command
