@@ -31,7 +31,7 @@ def demo(output: Path, **values: Any) -> None:
     """
     config = build_config(SynthesisConfig, values)
     from resdepth_colmap.cli.log import BarProgress
-    from resdepth_colmap.cli.report import show_comparison, show_run
+    from resdepth_colmap.cli.printed import show_comparison, show_run
     from resdepth_colmap.evaluation.truth import compare_with_truth
     from resdepth_colmap.pipeline.run import run_refine
     from resdepth_colmap.training.synthesize import synthesize

@@ -69,7 +69,7 @@ def refine(workspace: Path, backend: StereoBackend, **values: Any) -> None:
         **{name: values[name] for name in _RUN_OPTIONS},
     )
     from resdepth_colmap.cli.log import BarProgress
-    from resdepth_colmap.cli.report import show_run
+    from resdepth_colmap.cli.printed import show_run
     from resdepth_colmap.pipeline.run import run_refine
 
     show_run(run_refine(workspace, config, BarProgress()))
