@@ -80,6 +80,20 @@ class StereoConfig(Config):
         max_image_size: Longest image side to match at, in pixels; -1 = as it is.
         depth_min: Nearest depth, in workspace units; -1 = from the scene.
         depth_max: Farthest depth, in workspace units; -1 = from the scene.
+        min_triangulation_angle: Least angle, in degrees, of the sparse points that an
+            automatically chosen source shares with the image.
+        geom_consistency: Match a second time, against the depth maps of the first.
+        filter: Drop what too few sources agree with.
+        filter_min_ncc: Least correlation with a source that agrees.
+        filter_min_triangulation_angle: Least angle, in degrees, to a source that
+            agrees.
+        filter_min_num_consistent: Sources that have to agree.
+        filter_geom_consistency_max_cost: Largest error there and back, in pixels, of a
+            source that agrees.
+        write_consistency_graph: Write down which sources agree with each pixel, too.
+        mask_path: Folder of masks, "<image name>.png"; where one is 0, there will be no
+            depth.
+        cache_size: Memory for images and maps that are needed again, in GB.
         seed: Seed of the random hypotheses.
     """
 
@@ -91,6 +105,16 @@ class StereoConfig(Config):
     max_image_size: int = -1
     depth_min: float = -1.0
     depth_max: float = -1.0
+    min_triangulation_angle: float = 1.0
+    geom_consistency: bool = True
+    filter: bool = True
+    filter_min_ncc: float = 0.1
+    filter_min_triangulation_angle: float = 3.0
+    filter_min_num_consistent: int = 2
+    filter_geom_consistency_max_cost: float = 1.0
+    write_consistency_graph: bool = False
+    mask_path: Path | None = None
+    cache_size: float = 0.25
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -117,12 +141,40 @@ class StereoConfig(Config):
             "-1 or at least 32",
             max_image_size=self.max_image_size,
         )
-        given = self.depth_min > 0 or self.depth_max > 0
+        given = not (self.depth_min < 0 and self.depth_max < 0)
         self._check(
             not given or 0 < self.depth_min < self.depth_max,
             "0 < depth_min < depth_max, both given or neither",
             depth_min=self.depth_min,
             depth_max=self.depth_max,
+        )
+        self._check(self.cache_size >= 0, "0 or more", cache_size=self.cache_size)
+        self._check_filter()
+
+    def _check_filter(self) -> None:
+        self._check(
+            -1 <= self.filter_min_ncc <= 1,
+            "-1 to 1",
+            filter_min_ncc=self.filter_min_ncc,
+        )
+        for name in ("min_triangulation_angle", "filter_min_triangulation_angle"):
+            angle = getattr(self, name)
+            self._check(0 <= angle <= 180, "0 to 180 degrees", **{name: angle})
+        self._check(
+            self.filter_min_num_consistent >= 0,
+            "at least 0",
+            filter_min_num_consistent=self.filter_min_num_consistent,
+        )
+        self._check(
+            self.filter_geom_consistency_max_cost >= 0,
+            "at least 0",
+            filter_geom_consistency_max_cost=self.filter_geom_consistency_max_cost,
+        )
+        self._check(
+            self.filter or not self.write_consistency_graph,
+            "a filter: it is what tells who agrees",
+            write_consistency_graph=self.write_consistency_graph,
+            filter=self.filter,
         )
 
 
