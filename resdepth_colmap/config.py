@@ -310,6 +310,8 @@ class TrainConfig(Config):
         weight_decay: Adam's weight decay.
         checkpoint_steps: Save the state every so many steps.
         seed: Seed of weights, crops and order.
+        init: Weights file to start from, with a fresh optimiser; "shipped" = those that
+            come with the package. The network is then the file's. None = random ones.
     """
 
     steps: int = 3000
@@ -319,6 +321,7 @@ class TrainConfig(Config):
     weight_decay: float = 1e-5
     checkpoint_steps: int = 100
     seed: int = 0
+    init: Path | None = None
 
     def __post_init__(self) -> None:
         """Check the ranges once, so that no later code has to."""

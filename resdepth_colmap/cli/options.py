@@ -121,6 +121,17 @@ def build_config(kind: type[ConfigType], values: Mapping[str, Any]) -> ConfigTyp
     return kind(**{name: value for name, value in values.items() if name in names})
 
 
+def given_values(kind: type[Config], values: Mapping[str, Any]) -> dict[str, Any]:
+    """Those of a configuration's values that the user typed, defaults left out."""
+    context = click.get_current_context()
+    default = click.core.ParameterSource.DEFAULT
+    return {
+        field.name: values[field.name]
+        for field in dataclasses.fields(kind)
+        if context.get_parameter_source(field.name) is not default
+    }
+
+
 def attribute_helps(kind: type[Any]) -> dict[str, str]:
     """The text of each attribute in the "Attributes:" of a class's docstring."""
     text = inspect.cleandoc(kind.__doc__ or "").partition("Attributes:\n")[2]

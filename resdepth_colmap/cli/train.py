@@ -5,7 +5,12 @@ from typing import Any
 
 import click
 
-from resdepth_colmap.cli.options import build_config, command, config_options
+from resdepth_colmap.cli.options import (
+    build_config,
+    command,
+    config_options,
+    given_values,
+)
 from resdepth_colmap.config import TrainConfig
 from resdepth_colmap.network.network_config import NetworkConfig
 
@@ -15,6 +20,7 @@ from resdepth_colmap.network.network_config import NetworkConfig
     "synthesize rooms/ --num-scenes 100 --num-views 3",
     "stereo rooms/room_000000",
     "train rooms/room_* --output training/",
+    "train rooms/room_* --output more/ --init shipped --learning-rate 3e-4",
 )
 @click.argument(
     "workspaces",
@@ -35,10 +41,12 @@ def train(workspaces: tuple[Path, ...], output: Path, **values: Any) -> None:
 
     The path of the weights is printed, for `refine --weights`.
     """
-    network_config = build_config(NetworkConfig, values)
     config = build_config(TrainConfig, values)
+    given = given_values(NetworkConfig, values)
     from resdepth_colmap.cli.log import BarProgress
+    from resdepth_colmap.training.beginning import chosen_network
     from resdepth_colmap.training.loop import train as run_training
 
+    network_config = chosen_network(config, given)
     path = run_training(workspaces, output, network_config, config, BarProgress())
     click.echo(path)

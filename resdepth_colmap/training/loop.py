@@ -16,6 +16,7 @@ from resdepth_colmap.network.network_config import NetworkConfig
 from resdepth_colmap.network.unet import ResDepthNet
 from resdepth_colmap.network.weights import save_weights
 from resdepth_colmap.pipeline.progress import Progress, SilentProgress
+from resdepth_colmap.training.beginning import fresh_network
 from resdepth_colmap.training.crops import Batch, CropSampler
 from resdepth_colmap.training.loss import refinement_loss
 from resdepth_colmap.training.samples import prepare_samples
@@ -64,8 +65,11 @@ def train(
 
     Raises:
         TrainingError: Without samples, or when the loss is not a number.
+        WeightsError: If the weights to start from cannot be read.
+        ConfigError: If they are of another network than `network_config`.
     """
     progress = progress or SilentProgress()
+    network = fresh_network(network_config, config)
     held_out = workspaces[VALIDATION_SHARE - 1 :: VALIDATION_SHARE]
     used = [path for path in workspaces if path not in held_out]
     cache = output / "samples"
@@ -75,7 +79,7 @@ def train(
         if held_out
         else None
     )
-    run = _start(network_config, config)
+    run = _start(network, config)
     first = _resume(run, output / "state.pt")
     with (
         progress.stage("Training", config.steps) as advance,
@@ -115,9 +119,8 @@ def _sampler(
     )
 
 
-def _start(network_config: NetworkConfig, config: TrainConfig) -> Run:
-    torch.manual_seed(config.seed)
-    network = ResDepthNet(network_config).to(memory_format=torch.channels_last)  # type: ignore[call-overload] # torch's stubs lack the keyword
+def _start(network: ResDepthNet, config: TrainConfig) -> Run:
+    network = network.to(memory_format=torch.channels_last)  # type: ignore[call-overload] # torch's stubs lack the keyword
     optimiser = torch.optim.AdamW(
         network.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay
     )

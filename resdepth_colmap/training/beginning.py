@@ -1,0 +1,78 @@
+"""The network that a training begins with: random, or that of a weights file."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from resdepth_colmap.config import TrainConfig
+from resdepth_colmap.errors import ConfigError
+from resdepth_colmap.network.network_config import NetworkConfig
+from resdepth_colmap.network.unet import ResDepthNet
+from resdepth_colmap.network.weights import default_weights_path, load_weights
+
+SHIPPED = Path("shipped")
+"""As the file to start from: the weights that come with the package."""
+
+
+def chosen_network(config: TrainConfig, options: Mapping[str, Any]) -> NetworkConfig:
+    """The network that these options ask for.
+
+    Args:
+        config: Its `init` may name weights, whose network it then is.
+        options: Attributes of `NetworkConfig` that were asked for.
+
+    Raises:
+        WeightsError: If the weights to start from cannot be read.
+        ConfigError: If they are of another network than the options say.
+    """
+    if config.init is None:
+        return NetworkConfig.from_mapping(dict(options))
+    path = _path(config.init)
+    theirs = load_weights(path).config
+    ours = NetworkConfig.from_mapping({**theirs.to_mapping(), **options})
+    _check_same(path, theirs, ours)
+    return theirs
+
+
+def fresh_network(network_config: NetworkConfig, config: TrainConfig) -> ResDepthNet:
+    """The network before the first step.
+
+    Args:
+        network_config: The network.
+        config: Its seed makes random weights, its `init` names others.
+
+    Returns:
+        The network, on the CPU.
+
+    Raises:
+        WeightsError: If the weights to start from cannot be read.
+        ConfigError: If they are of another network.
+    """
+    torch.manual_seed(config.seed)
+    network = ResDepthNet(network_config)
+    if config.init is not None:
+        path = _path(config.init)
+        loaded = load_weights(path)
+        _check_same(path, loaded.config, network_config)
+        network.load_state_dict(loaded.state_dict())
+    return network
+
+
+def _path(init: Path) -> Path:
+    return default_weights_path() if init == SHIPPED else init
+
+
+def _check_same(path: Path, theirs: NetworkConfig, ours: NetworkConfig) -> None:
+    other, wanted = theirs.to_mapping(), ours.to_mapping()
+    differences = [
+        f"{name} {other[name]}, not {wanted[name]}"
+        for name in wanted
+        if other[name] != wanted[name]
+    ]
+    if differences:
+        raise ConfigError(
+            f"{path}: weights of another network ({', '.join(differences)}); leave "
+            "these options out, or train without --init."
+        )

@@ -1,0 +1,62 @@
+"""Laws of the network before the first step."""
+
+import dataclasses
+from pathlib import Path
+
+import pytest
+import torch
+
+from resdepth_colmap.config import TrainConfig
+from resdepth_colmap.errors import ConfigError
+from resdepth_colmap.network.network_config import NetworkConfig
+from resdepth_colmap.network.unet import ResDepthNet
+from resdepth_colmap.network.weights import load_weights, save_weights
+from resdepth_colmap.training.beginning import SHIPPED, chosen_network, fresh_network
+
+NETWORK = NetworkConfig(levels=2, base_channels=4, max_channels=8)
+
+
+@pytest.fixture
+def weights(tmp_path: Path) -> Path:
+    torch.manual_seed(7)
+    path = tmp_path / "first.safetensors"
+    save_weights(path, ResDepthNet(NETWORK))
+    return path
+
+
+def test_weights_to_start_from_are_the_first_weights(weights: Path) -> None:
+    config = TrainConfig(init=weights)
+    network = fresh_network(chosen_network(config, {}), config)
+    expected = load_weights(weights).state_dict()
+    actual = network.state_dict()
+    assert network.config == NETWORK
+    assert all(torch.equal(actual[name], expected[name]) for name in expected)
+    assert all(value.requires_grad for value in network.parameters())
+
+
+def test_the_word_shipped_means_the_weights_of_the_package() -> None:
+    config = TrainConfig(init=SHIPPED)
+    expected = load_weights()
+    assert chosen_network(config, {}) == expected.config
+    network = fresh_network(expected.config, config)
+    assert torch.equal(network.head.weight, expected.head.weight)
+
+
+def test_another_network_than_that_of_the_weights_is_refused(weights: Path) -> None:
+    config = TrainConfig(init=weights)
+    assert chosen_network(config, {"levels": 2}) == NETWORK
+    with pytest.raises(ConfigError, match=r"first.safetensors.*levels 2, not 3"):
+        chosen_network(config, {"levels": 3})
+    with pytest.raises(ConfigError, match="gate True, not False"):
+        fresh_network(dataclasses.replace(NETWORK, gate=False), config)
+
+
+def test_the_same_seed_gives_the_same_random_weights() -> None:
+    first, again, other = (
+        fresh_network(NETWORK, TrainConfig(seed=seed))
+        .encoder[0]
+        .state_dict()["0.weight"]
+        for seed in (1, 1, 2)
+    )
+    assert torch.equal(first, again)
+    assert not torch.equal(first, other)
