@@ -2,11 +2,14 @@
 
 import dataclasses
 import enum
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.io.files import write_whole
+
+_SEPARATOR = re.compile("[,;]")
 
 
 class SourceKind(enum.StrEnum):
@@ -36,8 +39,9 @@ class SourceSpec:
 def read_sources(path: Path) -> dict[str, SourceSpec]:
     """Read a `patch-match.cfg`: an image name on a line, its sources on the next one.
 
-    Blank lines and lines that begin with "#" are skipped. An image named twice has the
-    sources named last.
+    Blank lines and lines that begin with "#" are skipped. Names of sources are parted
+    by "," or ";", as COLMAP does. An image named twice has the sources named first:
+    COLMAP skips the second turn, as its maps are there by then.
 
     Raises:
         WorkspaceError: If the file is not there or malformed; the line is named.
@@ -49,7 +53,10 @@ def read_sources(path: Path) -> dict[str, SourceSpec]:
             f"{path}, line {number}: no line of sources after {name!r}."
         )
     pairs = zip(lines[0::2], lines[1::2], strict=True)
-    return {name: _parse(path, number, text) for (_, name), (number, text) in pairs}
+    sources: dict[str, SourceSpec] = {}
+    for (_, name), (number, text) in pairs:
+        sources.setdefault(name, _parse(path, number, text))
+    return sources
 
 
 def write_patch_match_cfg(path: Path, sources: Mapping[str, SourceSpec]) -> None:
@@ -62,6 +69,7 @@ def write_patch_match_cfg(path: Path, sources: Mapping[str, SourceSpec]) -> None
     for name, spec in sources.items():
         for source in spec.names:
             _check_name(path, source, forbidden=",")
+            _check_name(path, source, forbidden=";")
         lines += [name, _format(spec)]
     _write_lines(path, lines)
 
@@ -85,7 +93,7 @@ def write_fusion_cfg(path: Path, names: Sequence[str]) -> None:
 
 
 def _parse(path: Path, number: int, text: str) -> SourceSpec:
-    parts = [part.strip() for part in text.split(",") if part.strip()]
+    parts = [part.strip() for part in _SEPARATOR.split(text) if part.strip()]
     if parts == ["__all__"]:
         return SourceSpec(kind=SourceKind.ALL)
     if len(parts) == 2 and parts[0] == "__auto__" and _is_count(parts[1]):

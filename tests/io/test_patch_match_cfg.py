@@ -42,6 +42,22 @@ def test_comments_blank_lines_and_windows_line_ends_are_skipped(tmp_path: Path) 
     assert read_sources(path) == {"a.png": explicit}
 
 
+def test_names_are_parted_by_commas_and_semicolons_not_by_blanks(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "patch-match.cfg"
+    path.write_text("a b.png\n\n  c d.png ;e.png,, f.png;\n", encoding="utf-8")
+    names = ("c d.png", "e.png", "f.png")
+    explicit = SourceSpec(kind=SourceKind.EXPLICIT, names=names)
+    assert read_sources(path) == {"a b.png": explicit}
+
+
+def test_of_two_lists_for_an_image_the_first_counts(tmp_path: Path) -> None:
+    path = tmp_path / "patch-match.cfg"
+    path.write_text("a.png\n__all__\na.png\nb.png\n", encoding="utf-8")
+    assert read_sources(path) == {"a.png": SourceSpec(kind=SourceKind.ALL)}
+
+
 @pytest.mark.parametrize(
     ("content", "line"),
     [
@@ -80,7 +96,8 @@ def test_a_name_that_would_be_read_as_another_is_not_written(
     assert not list(tmp_path.iterdir())
 
 
-def test_a_source_with_a_comma_is_not_written(tmp_path: Path) -> None:
-    spec = SourceSpec(kind=SourceKind.EXPLICIT, names=("a,b.png",))
-    with pytest.raises(WorkspaceError, match=r"a,b\.png"):
+@pytest.mark.parametrize("name", ["a,b.png", "a;b.png"])
+def test_a_source_with_a_comma_is_not_written(tmp_path: Path, name: str) -> None:
+    spec = SourceSpec(kind=SourceKind.EXPLICIT, names=(name,))
+    with pytest.raises(WorkspaceError, match=name):
         write_patch_match_cfg(tmp_path / "patch-match.cfg", {"c.png": spec})
