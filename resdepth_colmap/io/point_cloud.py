@@ -47,6 +47,18 @@ class PointCloud:
         """The number of points."""
         return len(self.points)
 
+    def sampled(self, most: int, seed: int = 0) -> "PointCloud":
+        """At most so many of the points, drawn at random, in their old order."""
+        if len(self) <= most:
+            return self
+        rng = np.random.default_rng(seed)
+        kept = np.sort(rng.choice(len(self), most, replace=False))
+        return PointCloud(
+            points=self.points[kept],
+            colors=self.colors[kept],
+            normals=self.normals[kept],
+        )
+
 
 def check_cloud_path(path: Path) -> None:
     """Check that a cloud can be written in the format of a path's extension.

@@ -91,16 +91,16 @@ def fuse_workspace(
     return _cleaned(cloud, statistics, config)
 
 
-def count_consistent(
+def fuse_initial(
     workspace: Workspace,
     scene: Scene,
     kinds: Mapping[str, str],
     config: FuseConfig,
     progress: Progress | None = None,
-) -> FuseStatistics:
-    """How many points the maps before the refinement would have given.
+) -> Consistent:
+    """The cloud that the maps before the refinement would have given.
 
-    The same function as for refined maps, so that both numbers can be compared; the
+    The same function as for refined maps, so that both clouds can be compared; the
     normals are computed from the depth, as those of refined maps are.
 
     Args:
@@ -122,7 +122,7 @@ def count_consistent(
         for view in scene.views
         if view.name in kinds
     ]
-    return fuse_maps(files, scene, config, progress, "Fusing as it was").statistics
+    return fuse_maps(files, scene, config, progress, "Fusing as it was")
 
 
 def fuse_maps(

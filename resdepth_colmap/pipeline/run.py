@@ -13,11 +13,11 @@ from resdepth_colmap.config import Fuser
 from resdepth_colmap.errors import FusionError
 from resdepth_colmap.io.model import read_scene
 from resdepth_colmap.io.output import OutputWorkspace, read_record, write_record
-from resdepth_colmap.io.point_cloud import write_cloud
+from resdepth_colmap.io.point_cloud import PointCloud, write_cloud
 from resdepth_colmap.io.workspace import Workspace, check_images, open_workspace
 from resdepth_colmap.network.device import resolve_device
 from resdepth_colmap.network.weights import load_weights
-from resdepth_colmap.pipeline.fuse import count_consistent, fuse_workspace
+from resdepth_colmap.pipeline.fuse import fuse_initial, fuse_workspace
 from resdepth_colmap.pipeline.fuse_to_file import cloud_path
 from resdepth_colmap.pipeline.progress import Progress, SilentProgress
 from resdepth_colmap.pipeline.refine_workspace import RefineReport, refine_workspace
@@ -27,6 +27,9 @@ from resdepth_colmap.pipeline.versions import peak_memory_mb, versions
 from resdepth_colmap.scene import Scene
 
 logger = logging.getLogger(__name__)
+
+MOST_POINTS_SHOWN = 150_000
+"""Points of a cloud that are kept to be shown."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -40,7 +43,9 @@ class RunResult:
         num_points: Its points.
         num_points_before: Points that the initial maps give, fused in the same way;
             None if nobody counted them.
+        cloud_before: A sample of these points, `MOST_POINTS_SHOWN` at most, to show.
         overview_path: The picture of the whole workspace; None without pictures.
+        report_path: The page that shows all of it; None as long as nobody wrote it.
     """
 
     stereo: StereoReport
@@ -48,7 +53,9 @@ class RunResult:
     cloud_path: Path | None = None
     num_points: int = 0
     num_points_before: int | None = None
+    cloud_before: PointCloud | None = None
     overview_path: Path | None = None
+    report_path: Path | None = None
 
 
 def run_refine(
@@ -144,31 +151,33 @@ class _Run:
                 self.output, self.scene, self.config.fuse, self.progress
             )
             write_cloud(path, fused.cloud)
-        num_before = None
+        result = dataclasses.replace(
+            result, cloud_path=path, num_points=len(fused.cloud)
+        )
         # COLMAP's fusion keeps no account that could be compared.
         if self.config.fuse.fuser is Fuser.OPEN3D:
-            num_before = self._count_before(result.refine)
+            result = self._fuse_before(result)
         self.facts["fuse"] = {
             "points": len(fused.cloud),
-            "points_before_refinement": num_before,
+            "points_before_refinement": result.num_points_before,
             "thinned": fused.num_thinned,
             "outliers": fused.num_outliers,
             **dataclasses.asdict(fused.statistics),
         }
-        return dataclasses.replace(
-            result,
-            cloud_path=path,
-            num_points=len(fused.cloud),
-            num_points_before=num_before,
-        )
+        return result
 
-    def _count_before(self, refine: RefineReport) -> int:
-        kinds = {name: record["input"] for name, record in refine.images.items()}
+    def _fuse_before(self, result: RunResult) -> RunResult:
+        kinds = {name: facts["input"] for name, facts in result.refine.images.items()}
         with self._timed("fuse_before"):
-            statistics = count_consistent(
+            before = fuse_initial(
                 self.workspace, self.scene, kinds, self.config.fuse, self.progress
             )
-        return statistics.num_points
+        self.facts["fuse_before"] = dataclasses.asdict(before.statistics)
+        return dataclasses.replace(
+            result,
+            num_points_before=len(before.cloud),
+            cloud_before=before.cloud.sampled(MOST_POINTS_SHOWN),
+        )
 
     def _draw(self, result: RunResult) -> RunResult:
         from resdepth_colmap.pipeline.pictures import draw_workspace  # fonts: slow

@@ -31,6 +31,16 @@ def test_what_is_written_as_ply_is_read(tmp_path: Path, num_points: int) -> None
     assert [file.name for file in path.parent.iterdir()] == ["fused.ply"]
 
 
+def test_a_sample_is_some_of_the_points_each_with_its_own_colour() -> None:
+    cloud = _cloud(50)
+    sample = cloud.sampled(20)
+    rows = {tuple(row) for row in np.column_stack([cloud.points, cloud.colors])}
+    taken = {tuple(row) for row in np.column_stack([sample.points, sample.colors])}
+    assert len(sample) == len(taken) == 20
+    assert taken <= rows
+    assert cloud.sampled(50) is cloud
+
+
 def test_ply_holds_float32_as_other_programs_expect(tmp_path: Path) -> None:
     cloud = _cloud(5)
     write_cloud(tmp_path / "fused.ply", cloud)

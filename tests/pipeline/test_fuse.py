@@ -21,7 +21,7 @@ from resdepth_colmap.io.images import write_png
 from resdepth_colmap.io.output import OutputWorkspace
 from resdepth_colmap.io.workspace import Workspace
 from resdepth_colmap.pipeline import fuse
-from resdepth_colmap.pipeline.fuse import count_consistent, fuse_workspace
+from resdepth_colmap.pipeline.fuse import fuse_initial, fuse_workspace
 from resdepth_colmap.pipeline.fuse_view import LazyViews, MapFiles
 from resdepth_colmap.scene import Scene, View
 
@@ -99,7 +99,7 @@ def test_exact_maps_before_give_as_many_points_as_after(tmp_path: Path) -> None:
     for view in scene.views:
         path = output.source.depth_map_path(view.name, "photometric")
         write_depth_map(path, fuse_view(view).depth)
-    before = count_consistent(output.source, scene, kinds, FuseConfig())
+    before = fuse_initial(output.source, scene, kinds, FuseConfig()).statistics
     after = fuse_workspace(output, scene, FuseConfig()).statistics
     assert before.num_pixels == after.num_pixels
     # Normals computed across the silhouette differ from the exact ones.
