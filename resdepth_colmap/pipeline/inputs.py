@@ -129,7 +129,8 @@ def build_inputs(view: ViewTensors, config: NetworkConfig) -> InputStack:
     Args:
         view: The view; sources beyond `config.num_sources` are not looked at, missing
             ones become channels of zeros.
-        config: Says which channels.
+        config: Says which channels. The baseline too is that of a view without
+            sources if the network sees none: it must not depend on who calls.
 
     Returns:
         The stack, on the device and in the type of the view's inverse depth.
@@ -143,6 +144,8 @@ def build_inputs(view: ViewTensors, config: NetworkConfig) -> InputStack:
             image = warped[index][0] if is_there else torch.zeros_like(view.gray)
             channels[f"source_{index}"] = image
     names = [name for name in config.channels if name != "inverse_depth"]
+    if not config.uses_sources:
+        view = view._replace(sources=())
     nothing = view.inverse_depth[:, :0]
     guidance = torch.cat([nothing, *(channels[name] for name in names)], dim=1)
     return InputStack(view.inverse_depth, view.valid, guidance, _baseline(view))

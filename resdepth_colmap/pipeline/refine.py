@@ -127,7 +127,7 @@ def refine_view(
     """
     device = next(network.parameters()).device
     with _inference(network):
-        tensors = _tensors(view, device)
+        tensors = view_tensors(view, device)
         measured = tensors.inverse_depth[tensors.valid]
         low = float(measured.min()) * LEAST_INVERSE_RATIO
         high = float(measured.max()) * LARGEST_INVERSE_RATIO
@@ -201,7 +201,12 @@ def _refine_tile(tile: InputStack, network: ResDepthNet) -> Tensor:
     return torch.cat([change, torch.exp(log_scale) * scaling.scale], dim=1)
 
 
-def _tensors(view: ViewInputs, device: torch.device) -> ViewTensors:
+def view_tensors(view: ViewInputs, device: torch.device) -> ViewTensors:
+    """A view as tensors on a device, a batch of one.
+
+    Raises:
+        ValueError: If the initial depth map has no valid pixel.
+    """
     inverse_depth, valid = initial_tensors(view.depth)
     return ViewTensors(
         inverse_depth=inverse_depth.to(device),

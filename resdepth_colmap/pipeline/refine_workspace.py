@@ -10,7 +10,6 @@ import numpy as np
 
 from resdepth_colmap.config import RefineConfig
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.geometry.pixels import index_K
 from resdepth_colmap.geometry.view_selection import SourceChoice
 from resdepth_colmap.io.model import read_scene
 from resdepth_colmap.io.output import OutputWorkspace, read_record, write_record
@@ -25,19 +24,16 @@ from resdepth_colmap.pipeline.initial_map import (
     choose_initial_map,
 )
 from resdepth_colmap.pipeline.progress import Progress, SilentProgress
-from resdepth_colmap.pipeline.refine import (
-    RefinedView,
-    SourceView,
-    ViewInputs,
-    refine_view,
-)
+from resdepth_colmap.pipeline.refine import RefinedView, refine_view
 from resdepth_colmap.pipeline.refine_plan import Skipped, ViewPlan, plan_views
-from resdepth_colmap.pipeline.view_images import ViewImages, camera_at_scale
-from resdepth_colmap.scene import DepthMap, Scene, View, cam_from_cam
+from resdepth_colmap.pipeline.view_images import ViewImages
+from resdepth_colmap.pipeline.view_inputs import view_inputs
+from resdepth_colmap.scene import Scene
 
 logger = logging.getLogger(__name__)
 
 MOST_NAMES_SHOWN = 3
+IMAGE_CACHE_BYTES = 1 << 28  # the next view's sources are often those of this one
 
 RECORD_KEY = "images"
 """Where run.json holds what is known of each refined image."""
@@ -147,8 +143,7 @@ class _Loop:
         self.config = config
         self.network = network
         self.output = output
-        # One view and its sources, and as many that the next view may share.
-        self.view_images = ViewImages(workspace, 2 * (1 + network.config.num_sources))
+        self.view_images = ViewImages(workspace, IMAGE_CACHE_BYTES)
         self.record = read_record(output.record_path)
         self.images: dict[str, dict[str, Any]] = {}
 
@@ -195,7 +190,10 @@ class _Loop:
         initial = choose_initial_map(self.workspace, view.name, view.camera, plan.kinds)
         if not initial.filled:
             return f"its {initial.kind} depth map has no depth at all"
-        inputs = self._view_inputs(plan, view, initial.depth)
+        sources = [choice.index for choice in plan.sources]
+        inputs = view_inputs(
+            self.scene, plan.index, sources, initial.depth, self.view_images
+        )
         result = refine_view(inputs, self.network, self.config)
         self.output.write_maps(
             view.name, result.depth, result.normals, result.confidence
@@ -205,29 +203,6 @@ class _Loop:
         self.images[view.name]["seconds"] = round(seconds, 3)
         self._save()
         return ""
-
-    def _view_inputs(self, plan: ViewPlan, view: View, depth: DepthMap) -> ViewInputs:
-        """The view at the size of its map, its sources at the same scale."""
-        height_px, width_px = depth.shape
-        camera = view.camera.resized(width_px, height_px)
-        scale = width_px / view.camera.width_px
-        sources = []
-        for choice in plan.sources:
-            source = self.scene.views[choice.index]
-            source_camera = camera_at_scale(source.camera, scale)
-            sources.append(
-                SourceView(
-                    gray=self.view_images.gray(source, source_camera),
-                    K=index_K(source_camera),
-                    source_from_reference=cam_from_cam(source, view),
-                )
-            )
-        return ViewInputs(
-            depth=depth,
-            gray=self.view_images.gray(view, camera),
-            K=index_K(camera),
-            sources=tuple(sources),
-        )
 
     def _save(self) -> None:
         self.record = {**self.record, RECORD_KEY: self.images}

@@ -215,3 +215,15 @@ def test_gradients_flow_from_the_stack_to_the_depth() -> None:
     assert inverse.grad is not None
     assert torch.isfinite(inverse.grad).all()
     assert inverse.grad.any()
+
+
+@pytest.mark.parametrize("variant", [InputVariant.MONO, InputVariant.DEPTH_ONLY])
+def test_a_network_that_sees_no_sources_is_the_same_with_and_without_them(
+    variant: InputVariant,
+) -> None:
+    config = NetworkConfig.paper(variant)
+    view = view_of(plane_pair())
+    with_sources = build_inputs(view, config)
+    without = build_inputs(view._replace(sources=()), config)
+    assert torch.equal(with_sources.baseline, without.baseline)
+    assert torch.equal(with_sources.guidance, without.guidance)
