@@ -1,0 +1,53 @@
+"""The options of the cloud scores: defaults of ETH3D's evaluation program."""
+
+import dataclasses
+import itertools
+import math
+
+from resdepth_colmap.config import Config
+
+DEFAULT_TOLERANCES = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class CloudConfig(Config):
+    """How a cloud is compared with laser scans; names and defaults are ETH3D's.
+
+    Attributes:
+        tolerances: Distances up to which a point is right, in metres, increasing.
+        voxel_size: Side of the voxels over which scores are averaged, in metres.
+        beam_start_radius_meters: Radius of the laser beam at the scanner.
+        beam_divergence_halfangle_deg: Half the angle by which the beam widens.
+    """
+
+    tolerances: tuple[float, ...] = DEFAULT_TOLERANCES
+    voxel_size: float = 0.01
+    beam_start_radius_meters: float = 0.5 * 0.00225
+    beam_divergence_halfangle_deg: float = 0.011
+
+    def __post_init__(self) -> None:
+        """Check the values once, so that no later code has to."""
+        tolerances = self.tolerances
+        positive = all(0 < tolerance < math.inf for tolerance in tolerances)
+        self._check(
+            bool(tolerances) and positive,
+            "one or more distances above 0, in metres",
+            tolerances=tolerances,
+        )
+        increasing = all(a < b for a, b in itertools.pairwise(tolerances))
+        self._check(increasing, "increasing distances", tolerances=tolerances)
+        self._check(
+            0 < self.voxel_size < math.inf,
+            "a length above 0",
+            voxel_size=self.voxel_size,
+        )
+        self._check(
+            0 <= self.beam_start_radius_meters < math.inf,
+            "a length, 0 or more",
+            beam_start_radius_meters=self.beam_start_radius_meters,
+        )
+        self._check(
+            0 <= self.beam_divergence_halfangle_deg < 45,
+            "an angle of 0 to 45 degrees",
+            beam_divergence_halfangle_deg=self.beam_divergence_halfangle_deg,
+        )

@@ -1,0 +1,91 @@
+"""A laser scan as its scanner sees it: points sorted by direction.
+
+Azimuth and inclination are cut into 2048 x 1024 cells; the points of a cell lie
+together in memory. The grid only finds points faster, and is that of ETH3D's evaluation
+program (https://github.com/ETH3D/multi-view-evaluation, accuracy.cc), with its rounding
+to float32, which is coarse about the poles.
+"""
+
+import dataclasses
+
+import numpy as np
+import numpy.typing as npt
+
+NUM_ROWS = 1024
+"""Cells from zenith to nadir."""
+
+NUM_COLUMNS = 2 * NUM_ROWS
+"""Cells of a full turn."""
+
+_ROW_RAD = np.float32(np.pi / NUM_ROWS)
+_COLUMN_RAD = np.float32(2 * np.pi / NUM_COLUMNS)
+
+Floats = npt.NDArray[np.float32]
+Indices = npt.NDArray[np.int64]
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
+class LaserScan:
+    """Points of one scan in the frame of its scanner, sorted by cell.
+
+    Attributes:
+        points: Coordinates, shape (N, 3).
+        directions: Unit vectors from the scanner to the points, shape (N, 3).
+        radii: Distances from the scanner, shape (N,).
+        cell_starts: Index of the first point of each cell, and N, shape
+            (NUM_ROWS * NUM_COLUMNS + 1,). Cells are numbered row by row.
+    """
+
+    points: Floats
+    directions: Floats
+    radii: Floats
+    cell_starts: Indices
+
+
+def sort_scan(points: Floats) -> LaserScan:
+    """Sort the points of a scan by direction.
+
+    Args:
+        points: Finite coordinates in the frame of the scanner (origin, z up), shape
+            (N, 3).
+    """
+    azimuth, inclination, radius = spherical(points)
+    cells = rows_of(inclination) * NUM_COLUMNS
+    cells += columns_of(azimuth) % NUM_COLUMNS
+    order = np.argsort(cells, kind="stable")
+    num_points = np.bincount(cells, minlength=NUM_ROWS * NUM_COLUMNS)
+    radii = radius[order]
+    sorted_points = points[order]
+    scale = np.where(radii > 0, radii, np.float32(1))[:, np.newaxis]
+    return LaserScan(
+        points=sorted_points,
+        directions=(sorted_points / scale).astype(np.float32, copy=False),
+        radii=radii,
+        cell_starts=np.concatenate([[0], np.cumsum(num_points)]),
+    )
+
+
+def spherical(points: Floats) -> tuple[Floats, Floats, Floats]:
+    """Azimuth (-pi to pi), inclination (0 to pi from the zenith) and radius.
+
+    At the origin the inclination is taken as pi: ETH3D's program happens to look there.
+    """
+    x, y, z = points.T
+    radius = np.sqrt((x * x + y * y) + z * z)
+    is_origin = radius == 0
+    cosine = np.where(is_origin, np.float32(-1), z) / np.where(is_origin, 1, radius)
+    cosine = np.clip(cosine.astype(np.float32), -1, 1)
+    return np.arctan2(y, x), np.arccos(cosine), radius
+
+
+def rows_of(inclination: Floats) -> Indices:
+    """Row of the cell; beyond the poles that of the pole."""
+    rows: Indices = np.floor(inclination / _ROW_RAD).astype(np.int64)
+    return rows.clip(0, NUM_ROWS - 1)
+
+
+def columns_of(azimuth: Floats) -> Indices:
+    """Column of the cell, not wrapped round to 0..NUM_COLUMNS."""
+    cells = azimuth / _COLUMN_RAD
+    columns: Indices = np.trunc(cells).astype(np.int64) - (cells < 0)
+    return columns
