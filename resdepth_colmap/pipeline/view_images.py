@@ -1,32 +1,70 @@
-"""Grey images at the size of the maps, the last few of them kept."""
+"""Images and depth maps at the size that is matched at, the last few of them kept."""
 
 import collections
+from collections.abc import Callable, Hashable
 
 import cv2
 import numpy as np
 
+from resdepth_colmap.io.depth_map import read_depth_map
 from resdepth_colmap.io.images import read_gray
 from resdepth_colmap.io.workspace import Workspace
-from resdepth_colmap.scene import Camera, GrayImage, View
+from resdepth_colmap.scene import Camera, DepthMap, FloatMap, GrayImage, View
 
 Size = tuple[int, int]
 
 
-class ViewImages:
-    """Loads images resized to what is asked for; memory holds `capacity` of them.
+class ArrayCache:
+    """Keeps the arrays that were asked for last; memory holds so many bytes of them.
 
     Attributes:
-        workspace: Where the images lie.
-        capacity: Number of images to keep.
+        max_num_bytes: An array is forgotten when there are more.
     """
 
-    def __init__(self, workspace: Workspace, capacity: int) -> None:
+    def __init__(self, max_num_bytes: int) -> None:
         """Keep nothing yet."""
-        self.workspace = workspace
-        self.capacity = capacity
-        self._kept: collections.OrderedDict[tuple[str, Size], GrayImage] = (
+        self.max_num_bytes = max_num_bytes
+        self._kept: collections.OrderedDict[Hashable, FloatMap] = (
             collections.OrderedDict()
         )
+
+    @property
+    def num_bytes(self) -> int:
+        """Memory of what is kept."""
+        return sum(array.nbytes for array in self._kept.values())
+
+    def get(self, key: Hashable, load: Callable[[], FloatMap]) -> FloatMap:
+        """What is kept under that key; else what `load` returns, and it is kept."""
+        if key not in self._kept:
+            array = load()
+            self._forget(array.nbytes)
+            if array.nbytes > self.max_num_bytes:
+                return array
+            self._kept[key] = array
+        self._kept.move_to_end(key)
+        return self._kept[key]
+
+    def drop(self, key: Hashable) -> None:
+        """Forget an array: its file has changed."""
+        self._kept.pop(key, None)
+
+    def _forget(self, num_more: int) -> None:
+        while self._kept and self.num_bytes + num_more > self.max_num_bytes:
+            self._kept.popitem(last=False)
+
+
+class ViewImages:
+    """Loads images and depth maps resized to what is asked for, through a cache.
+
+    Attributes:
+        workspace: Where they lie.
+        cache: What was loaded last.
+    """
+
+    def __init__(self, workspace: Workspace, max_num_bytes: int) -> None:
+        """Keep nothing yet, and up to that many bytes later."""
+        self.workspace = workspace
+        self.cache = ArrayCache(max_num_bytes)
 
     def gray(self, view: View, camera: Camera) -> GrayImage:
         """Grey values of a view in 0..1, at the size of `camera`, float32.
@@ -34,25 +72,46 @@ class ViewImages:
         Raises:
             WorkspaceError: If the image is missing or cannot be read.
         """
-        key = (view.name, (camera.width_px, camera.height_px))
-        if key not in self._kept:
-            while len(self._kept) >= self.capacity:
-                self._kept.popitem(last=False)
-            self._kept[key] = self._load(view, key[1])
-        self._kept.move_to_end(key)
-        return self._kept[key]
+        size = (camera.width_px, camera.height_px)
+        return self.cache.get((view.name, size), lambda: self._load_gray(view, size))
 
-    def _load(self, view: View, size: Size) -> GrayImage:
+    def depth(self, view: View, camera: Camera, kind: str) -> DepthMap:
+        """A depth map of a view, at the size of `camera`, float32; 0 = no depth.
+
+        A map of another size is sampled at the nearest pixels; where there is no file,
+        no pixel has a depth.
+
+        Raises:
+            WorkspaceError: If the map cannot be read.
+        """
+        size = (camera.width_px, camera.height_px)
+        key = (view.name, size, kind)
+        return self.cache.get(key, lambda: self._load_depth(view, size, kind))
+
+    def _load_gray(self, view: View, size: Size) -> GrayImage:
         gray = read_gray(self.workspace.image_path(view.name))
         if gray.shape == size[::-1]:
             return gray
         # The area's mean, so that a smaller image shows no false patterns.
         return resized_gray(gray, size)
 
+    def _load_depth(self, view: View, size: Size, kind: str) -> DepthMap:
+        path = self.workspace.depth_map_path(view.name, kind)
+        if not path.is_file():
+            return np.zeros(size[::-1], np.float32)
+        depth = read_depth_map(path)
+        return depth if depth.shape == size[::-1] else nearest_resized(depth, size)
+
 
 def resized_gray(gray: GrayImage, size: Size) -> GrayImage:
     """An image at another (width, height), each pixel the mean of what it covers."""
     result = cv2.resize(gray, size, interpolation=cv2.INTER_AREA)
+    return np.asarray(result, dtype=np.float32)
+
+
+def nearest_resized(values: FloatMap, size: Size) -> FloatMap:
+    """A map at another (width, height), each pixel the nearest one of the map's."""
+    result = cv2.resize(values, size, interpolation=cv2.INTER_NEAREST_EXACT)
     return np.asarray(result, dtype=np.float32)
 
 
