@@ -33,6 +33,9 @@ class DepthMetrics:
         bad_1: Share of `num_pixels` off by more than 1 % of the true depth, in 0..1;
             missing and discarded pixels are bad. NaN without pixels.
         bad_2: The same for 2 %.
+        bad_1cm: The same for 0.01 workspace units, a centimetre where that is a metre.
+        bad_2cm: The same for 0.02 units.
+        bad_5cm: The same for 0.05 units.
     """
 
     num_pixels: int
@@ -44,6 +47,9 @@ class DepthMetrics:
     medae: float
     bad_1: float
     bad_2: float
+    bad_1cm: float
+    bad_2cm: float
+    bad_5cm: float
 
     def to_mapping(self) -> dict[str, float | int | None]:
         """Plain values, ready for JSON: NaN becomes None."""
@@ -81,15 +87,17 @@ def depth_metrics(
     residual = np.abs(np.where(present, estimate, np.inf) - true_depth)
     limit = math.inf if max_residual is None else max_residual
     kept = present & (residual <= limit)
-    num_bad = [int(np.sum(~kept | (residual > s * true_depth))) for s in (0.01, 0.02)]
     return DepthMetrics(
         num_pixels=true_depth.size,
         num_valid=int(kept.sum()),
         num_missing=int((~present).sum()),
         num_discarded=int((present & ~kept).sum()),
         **_errors(residual[kept]),
-        bad_1=num_bad[0] / true_depth.size if true_depth.size else math.nan,
-        bad_2=num_bad[1] / true_depth.size if true_depth.size else math.nan,
+        bad_1=_share(~kept | (residual > 0.01 * true_depth)),
+        bad_2=_share(~kept | (residual > 0.02 * true_depth)),
+        bad_1cm=_share(~kept | (residual > 0.01)),
+        bad_2cm=_share(~kept | (residual > 0.02)),
+        bad_5cm=_share(~kept | (residual > 0.05)),
     )
 
 
@@ -135,3 +143,7 @@ def _errors(residual: npt.NDArray[np.float64]) -> dict[str, float]:
         "rmse": float(np.sqrt(np.mean(residual**2))),
         "medae": float(np.median(residual)),
     }
+
+
+def _share(is_bad: npt.NDArray[np.bool_]) -> float:
+    return float(is_bad.mean()) if is_bad.size else math.nan

@@ -8,9 +8,16 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from resdepth_colmap.evaluation.markdown import (
+    NOT_KNOWN,
+    count,
+    markdown_table,
+    number,
+    percent,
+)
+
 HARDWARE = "two cores of an AMD EPYC, no GPU"
 DEPTHS = {"unfiltered": "unfiltered", "median": "5 x 5 median", "refined": "refined"}
-_NOT_KNOWN = "-"
 
 Measured = Mapping[str, Any]
 """A file of docs/measurements, parsed."""
@@ -33,7 +40,7 @@ def middlebury_table(measured: Measured) -> str:
         [
             _measured_by(measured),
             _ratio_sentence(measured),
-            _table(
+            markdown_table(
                 "scene | depth | MAE, m | RMSE, m | MedAE, mm | off by > 2 % | "
                 "valid pixels",
                 errors + means,
@@ -41,7 +48,7 @@ def middlebury_table(measured: Measured) -> str:
             ),
             "The matcher alone, where both views see the surface; "
             "and processor seconds a megapixel:",
-            _table(
+            markdown_table(
                 "scene | median relative error | off by > 1 % | off by > 2 % | "
                 "MAE, m | matching, s | refining, s",
                 matching,
@@ -63,7 +70,7 @@ def middlebury_summary(measured: Measured) -> str:
     )
     return "\n\n".join(
         [
-            _table(header, [*rows, _summary_row("**mean**", means)]),
+            markdown_table(header, [*rows, _summary_row("**mean**", means)]),
             _ratio_sentence(measured),
             _measured_by(measured),
         ]
@@ -85,7 +92,7 @@ def workspaces_table(measured: Measured) -> str:
     return "\n\n".join(
         [
             f"Measured by `{command}` on {HARDWARE}; stages in seconds.",
-            _table(header, rows, num_texts=2),
+            markdown_table(header, rows, num_texts=2),
         ]
     )
 
@@ -102,7 +109,7 @@ def refine_table(measured: Measured) -> str:
         for size in measured["sizes"]
     ]
     header = "size, px | megapixels | s a megapixel and pass | s of each repetition"
-    return "\n\n".join([_measured_by(measured), _table(header, rows)])
+    return "\n\n".join([_measured_by(measured), markdown_table(header, rows)])
 
 
 Renderer = Callable[[Measured], str]
@@ -156,10 +163,10 @@ def filled_in(text: str, places: Mapping[str, str]) -> str:
 
 def _error_cells(errors: Measured) -> list[str]:
     return [
-        _number(errors["mae"]),
-        _number(errors["rmse"]),
-        _number(errors["medae"], scale=1000, digits=1),
-        _percent(errors["bad_2"]),
+        number(errors["mae"]),
+        number(errors["rmse"]),
+        number(errors["medae"], scale=1000, digits=1),
+        percent(errors["bad_2"]),
     ]
 
 
@@ -167,18 +174,18 @@ def _matching_row(name: str, scene: Measured) -> list[str]:
     seen = scene["unfiltered_seen_by_both"]
     return [
         name,
-        _percent(seen["median_relative_error"], digits=2),
-        _percent(seen["bad_1"]),
-        _percent(seen["bad_2"]),
-        _number(seen["mae"]),
-        _number(scene["matching_cpu_s_per_mp"], digits=1),
-        _number(scene["refining_cpu_s_per_mp"], digits=1),
+        percent(seen["median_relative_error"], digits=2),
+        percent(seen["bad_1"]),
+        percent(seen["bad_2"]),
+        number(seen["mae"]),
+        number(scene["matching_cpu_s_per_mp"], digits=1),
+        number(scene["refining_cpu_s_per_mp"], digits=1),
     ]
 
 
 def _summary_row(name: str, errors: Mapping[str, Measured]) -> list[str]:
-    maes = [_number(errors[key]["mae"]) for key in DEPTHS]
-    bad = [_percent(errors[key]["bad_2"]) for key in ("unfiltered", "refined")]
+    maes = [number(errors[key]["mae"]) for key in DEPTHS]
+    bad = [percent(errors[key]["bad_2"]) for key in ("unfiltered", "refined")]
     return [name, *maes, *bad]
 
 
@@ -188,12 +195,12 @@ def _workspace_row(name: str, case: Measured, stages: list[str]) -> list[str]:
         name,
         f"`{' '.join(case['options'])}`" if case["options"] else "",
         str(case["num_images"]),
-        *[_number(case["seconds"].get(stage), digits=1) for stage in stages],
-        _number(case["seconds_in_all"], digits=1),
-        _NOT_KNOWN if memory_mb is None else f"{memory_mb / 1024:.1f} GiB",
-        *[_count(case[key]) for key in ("points_before", "points_after")],
-        *[_percent(case[key], 0) for key in ("filled_before", "filled_after")],
-        case.get("date", _NOT_KNOWN),
+        *[number(case["seconds"].get(stage), digits=1) for stage in stages],
+        number(case["seconds_in_all"], digits=1),
+        NOT_KNOWN if memory_mb is None else f"{memory_mb / 1024:.1f} GiB",
+        *[count(case[key]) for key in ("points_before", "points_after")],
+        *[percent(case[key], 0) for key in ("filled_before", "filled_after")],
+        case.get("date", NOT_KNOWN),
     ]
 
 
@@ -211,8 +218,8 @@ def _ratio_sentence(measured: Measured) -> str:
     mean, passes = measured["mean"], measured["options"]["refine"]["passes"]
     return (
         f"Refined over unfiltered, mean of {len(measured['scenes'])} scenes: MAE "
-        f"{_number(mean['mae_ratio'], digits=2)}, "
-        f"MedAE {_number(mean['medae_ratio'], digits=2)} "
+        f"{number(mean['mae_ratio'], digits=2)}, "
+        f"MedAE {number(mean['medae_ratio'], digits=2)} "
         f"({passes} {'pass' if passes == 1 else 'passes'})."
     )
 
@@ -224,25 +231,5 @@ def _measured_by(measured: Measured) -> str:
     )
 
 
-def _table(header: str, rows: list[list[str]], num_texts: int = 1) -> str:
-    """The first columns are texts, to the left; the others numbers, to the right."""
-    num_numbers = header.count(" | ") + 1 - num_texts
-    rule = "|".join(["---"] * num_texts + ["--:"] * num_numbers)
-    lines = [f"| {header} |", f"|{rule}|"]
-    return "\n".join(lines + [f"| {' | '.join(row)} |" for row in rows])
-
-
 def _spoken(stage: str) -> str:
     return stage.replace("_", " ")
-
-
-def _number(value: float | None, scale: float = 1, digits: int = 3) -> str:
-    return _NOT_KNOWN if value is None else f"{value * scale:.{digits}f}"
-
-
-def _count(value: int | None) -> str:
-    return _NOT_KNOWN if value is None else f"{value:,}"
-
-
-def _percent(value: float | None, digits: int = 1) -> str:
-    return _NOT_KNOWN if value is None else f"{100 * value:.{digits}f} %"
