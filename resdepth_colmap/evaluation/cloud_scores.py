@@ -89,7 +89,7 @@ def cloud_scores(
     """
     progress = progress or SilentProgress()
     points = _finite(points, "the cloud")
-    local = [_finite(scan.points, "a scan") for scan in scans]
+    local = [_finite(s.points, f"scan {i}") for i, s in enumerate(scans, start=1)]
     poses = [scan.world_from_scan.astype(np.float32) for scan in scans]
     world = np.concatenate([_moved(p, T) for p, T in zip(local, poses, strict=True)])
     if len(world) == 0:
