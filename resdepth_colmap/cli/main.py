@@ -4,6 +4,7 @@ from typing import Any
 
 import click
 
+from resdepth_colmap.cli.colmap_spelling import plain_name
 from resdepth_colmap.cli.lazy_group import LazyGroup
 from resdepth_colmap.cli.options import example, verbosity_options
 from resdepth_colmap.errors import ResDepthError
@@ -36,11 +37,6 @@ class _Program(LazyGroup):
             ctx.exit(INTERRUPTED)
 
 
-def _plain_name(token: str) -> str:
-    """COLMAP's spelling of an option, --PatchMatchStereo.window_radius, is ours too."""
-    return token.removeprefix("PatchMatchStereo.").replace("_", "-")
-
-
 @click.group(
     cls=_Program,
     module_prefix="resdepth_colmap.cli.",
@@ -49,7 +45,7 @@ def _plain_name(token: str) -> str:
     context_settings={
         "help_option_names": ["-h", "--help"],
         "max_content_width": 100,
-        "token_normalize_func": _plain_name,
+        "token_normalize_func": plain_name,
     },
 )
 @verbosity_options

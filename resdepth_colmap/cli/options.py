@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 
 import click
 
+from resdepth_colmap.cli import colmap_spelling
 from resdepth_colmap.config import Config
 
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -39,7 +40,9 @@ def command(short_help: str, *lines: str) -> Callable[[Command], click.Command]:
     """
 
     def decorate(function: Command) -> click.Command:
-        make = click.command(short_help=short_help, epilog=example(*lines))
+        make = click.command(
+            cls=colmap_spelling.Command, short_help=short_help, epilog=example(*lines)
+        )
         return make(verbosity_options(function))
 
     return decorate
