@@ -10,10 +10,8 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from resdepth_colmap.evaluation.paper import PAPER_MAX_RESIDUAL
 from resdepth_colmap.scene import DepthMap
-
-PAPER_MAX_RESIDUAL = 10.0
-"""The paper's limit on ETH3D, whose unit is the metre."""
 
 _ROWS_AT_ONCE = 128
 

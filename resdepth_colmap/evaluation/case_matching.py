@@ -1,0 +1,111 @@
+"""Initial depth of a case: what is there, or matched now, by COLMAP or by us."""
+
+import functools
+import re
+import time
+from collections.abc import Sequence
+
+import numpy as np
+
+from resdepth_colmap.config import StereoBackend, StereoConfig
+from resdepth_colmap.errors import BackendUnavailableError
+from resdepth_colmap.evaluation.colmap_pair import match_by_colmap
+from resdepth_colmap.evaluation.depth_case import DepthCase, InitialDepth
+from resdepth_colmap.evaluation.match_cache import MatchCache, Matching
+from resdepth_colmap.matching.patch_match import MatchView, match_view
+from resdepth_colmap.scene import DepthMap
+
+ORIGINS = {
+    StereoBackend.CPU: "our PatchMatch (CPU)",
+    StereoBackend.COLMAP: "COLMAP's PatchMatch (CUDA), unfiltered",
+}
+_WARM_UP_PX = 32
+_UNSAFE = re.compile(r"[^\w.-]+", re.ASCII)
+
+
+def matching_backend(requested: StereoBackend) -> StereoBackend:
+    """Who matches: COLMAP where pycolmap has CUDA, else we do.
+
+    Raises:
+        BackendUnavailableError: If COLMAP was asked for and has no CUDA here.
+    """
+    if requested not in (StereoBackend.AUTO, StereoBackend.COLMAP):
+        return StereoBackend.CPU
+    import pycolmap
+
+    if pycolmap.has_cuda:
+        return StereoBackend.COLMAP
+    if requested is StereoBackend.COLMAP:
+        raise BackendUnavailableError(
+            "COLMAP's PatchMatch needs CUDA, and this pycolmap has none; use "
+            "--stereo cpu, or install pycolmap-cuda12 on a machine with an NVIDIA GPU."
+        )
+    return StereoBackend.CPU
+
+
+def initial_depth(
+    scene: str,
+    case: DepthCase,
+    backend: StereoBackend,
+    config: StereoConfig,
+    cache: MatchCache | None = None,
+) -> InitialDepth:
+    """The depth that a case starts from.
+
+    Args:
+        scene: Name of its scene, for the file in the cache.
+        case: The view; depth that it has already is taken.
+        backend: Who matches it otherwise, as `matching_backend` says.
+        config: Options of the matcher.
+        cache: Where matched depth is kept.
+    """
+    if case.initial is not None:
+        return case.initial
+    views = (case.reference, *case.sources)
+    name = cache_name(scene, case.name, backend)
+    found = cache.find(name, views, case.depth_range, config) if cache else None
+    if found is None:
+        found = _match(views, case.depth_range, backend, config)
+        if cache:
+            cache.add(name, views, case.depth_range, config, found)
+    return InitialDepth(
+        depth=found.depth, origin=ORIGINS[backend], cpu_s=found.cpu_s or None
+    )
+
+
+def cache_name(scene: str, case: str, backend: StereoBackend) -> str:
+    """What the file of a case in the cache begins with."""
+    return _UNSAFE.sub("_", f"{scene}-{case}-{backend}")
+
+
+def _match(
+    views: Sequence[MatchView],
+    depth_range: tuple[float, float],
+    backend: StereoBackend,
+    config: StereoConfig,
+) -> Matching:
+    if backend is StereoBackend.COLMAP:
+        depth = match_by_colmap(views, depth_range, config)
+        return Matching(depth=depth, cpu_s=0.0)  # it ran on the GPU
+    _compile()
+    start = time.process_time()
+    depth = _match_here(views, depth_range, config)
+    return Matching(depth=depth, cpu_s=time.process_time() - start)
+
+
+def _match_here(
+    views: Sequence[MatchView], depth_range: tuple[float, float], config: StereoConfig
+) -> DepthMap:
+    return match_view(views[0], views[1:], depth_range, config).depth
+
+
+@functools.cache
+def _compile() -> None:
+    """Match a tiny pair, once: compiling is not measured."""
+    size = _WARM_UP_PX
+    gray = np.random.default_rng(0).random((size, size), dtype=np.float32)
+    K = np.array([[size, 0, size / 2], [0, size, size / 2], [0, 0, 1.0]])
+    left, right = np.eye(3, 4), np.eye(3, 4)
+    right[0, 3] = -0.1
+    views = [MatchView(gray=gray, K=K, cam_from_world=pose) for pose in (left, right)]
+    _match_here(views, (1.0, 2.0), StereoConfig(num_iterations=1))

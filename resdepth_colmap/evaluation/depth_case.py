@@ -1,0 +1,89 @@
+"""What the comparison of depth maps is made on: views whose depth is known."""
+
+import dataclasses
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import numpy.typing as npt
+
+from resdepth_colmap.config import StereoConfig
+from resdepth_colmap.matching.patch_match import MatchView
+from resdepth_colmap.scene import DepthMap, Matrix
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
+class InitialDepth:
+    """Unfiltered depth, and whose it is.
+
+    Attributes:
+        depth: Shape (H, W), in workspace units; 0 = no depth.
+        origin: Who made it, for people.
+        cpu_s: Processor seconds of all threads; None if it was there already.
+    """
+
+    depth: DepthMap
+    origin: str
+    cpu_s: float | None = None
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
+class DepthCase:
+    """One view whose depth is known.
+
+    Attributes:
+        name: Name of its image, or of the pair.
+        reference: The view.
+        sources: The views to compare it with, best first; at least one.
+        depth_range: Near and far depth to match between, in units.
+        truth: True depth, shape (H, W), in units; 0 = not known.
+        seen: Which pixels the first source sees too, shape (H, W), bool; None = not
+            known.
+        initial: Depth that is there already; None = it has to be matched.
+    """
+
+    name: str
+    reference: MatchView
+    sources: tuple[MatchView, ...]
+    depth_range: tuple[float, float]
+    truth: DepthMap
+    seen: npt.NDArray[np.bool_] | None = None
+    initial: InitialDepth | None = None
+
+    @property
+    def megapixels(self) -> float:
+        """Size of the view, in millions of pixels."""
+        return self.truth.size / 1e6
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class CaseOptions:
+    """What decides how much of a scene has to be read.
+
+    Attributes:
+        stereo: Options of the matcher; it takes up to `max_num_sources`.
+        num_sources: Second views that the network takes.
+    """
+
+    stereo: StereoConfig
+    num_sources: int
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class SceneSource:
+    """A scene that has not been read yet.
+
+    Attributes:
+        name: What it is called in the result; no other scene is called so.
+        read: Yields its cases, one after the other; WorkspaceError if it is broken.
+    """
+
+    name: str
+    read: Callable[[CaseOptions], Iterator[DepthCase]]
+
+
+def source_from_reference(case: DepthCase, source: MatchView) -> Matrix:
+    """The pose of a source, shape (3, 4), in units."""
+    reference_from_world = case.reference.cam_from_world
+    rotation = source.cam_from_world[:, :3] @ reference_from_world[:, :3].T
+    translation = source.cam_from_world[:, 3] - rotation @ reference_from_world[:, 3]
+    return np.column_stack([rotation, translation])
