@@ -1,0 +1,55 @@
+"""Laws of what is kept in memory of images and maps."""
+
+from pathlib import Path
+
+import numpy as np
+from planes import NAMES, write_plane_workspace
+
+from resdepth_colmap.io.workspace import open_workspace
+from resdepth_colmap.pipeline.view_images import ArrayCache, ViewImages
+from resdepth_colmap.scene import FloatMap
+
+
+def test_a_cache_holds_the_latest_and_no_more_than_it_may() -> None:
+    cache = ArrayCache(100)
+    loaded: list[int] = []
+
+    def get(number: int) -> FloatMap:
+        def load() -> FloatMap:
+            loaded.append(number)
+            return np.full(10, number, np.float32)  # 40 bytes
+
+        return cache.get(number, load)
+
+    for number in (1, 2, 1, 3, 1, 2):
+        assert (get(number) == number).all()
+        assert cache.num_bytes <= 100
+    assert loaded == [1, 2, 3, 2]  # 2 was the one that had not been asked for
+
+
+def test_what_is_larger_than_the_cache_is_loaded_each_time() -> None:
+    cache = ArrayCache(10)
+    first, second = (cache.get(0, lambda: np.zeros(9, np.float32)) for _ in range(2))
+    assert first is not second
+    assert cache.num_bytes == 0
+
+
+def test_images_and_maps_come_at_the_size_that_is_asked_for(tmp_path: Path) -> None:
+    (first, *_) = write_plane_workspace(tmp_path, kinds=("photometric",))
+    images = ViewImages(open_workspace(tmp_path), 1 << 20)
+    half = first.view.camera.resized(40, 30)
+    assert images.gray(first.view, half).shape == (30, 40)
+    depth = images.depth(first.view, half, "photometric")
+    assert depth.shape == (30, 40)
+    assert np.isin(depth, first.depth).all()  # nothing is mixed across an edge
+    whole = images.depth(first.view, first.view.camera, "photometric")
+    assert np.array_equal(whole, first.depth)
+
+
+def test_a_view_without_a_map_has_no_depth_anywhere(tmp_path: Path) -> None:
+    (first, *_) = write_plane_workspace(tmp_path, kinds=())
+    images = ViewImages(open_workspace(tmp_path), 1 << 20)
+    assert NAMES[0] == first.view.name
+    depth = images.depth(first.view, first.view.camera, "photometric")
+    assert depth.shape == first.depth.shape
+    assert not depth.any()
