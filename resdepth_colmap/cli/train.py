@@ -6,21 +6,21 @@ from typing import Any
 import click
 
 from resdepth_colmap.cli.options import (
-    build_config,
     command,
     config_options,
+    enum_option,
     given_values,
 )
-from resdepth_colmap.config import TrainConfig
 from resdepth_colmap.network.network_config import NetworkConfig
+from resdepth_colmap.training.train_config import Preset, TrainConfig
 
 
 @command(
     "Train a network on workspaces with known depth.",
     "synthesize rooms/ --num-scenes 100 --num-views 3",
-    "stereo rooms/room_000000",
-    "train rooms/room_* --output training/",
-    "train rooms/room_* --output more/ --init shipped --learning-rate 3e-4",
+    "train rooms/ --output training/ --validate-on real_scenes/",
+    "train rooms/ --output more/ --init shipped --learning-rate 3e-4",
+    "train rooms/ --output paper/ --preset paper --variant mono",
 )
 @click.argument(
     "workspaces",
@@ -32,21 +32,46 @@ from resdepth_colmap.network.network_config import NetworkConfig
     "--output",
     type=click.Path(path_type=Path, file_okay=False),
     required=True,
-    help="Folder of weights, state and log; a stopped training goes on from it.",
+    help="Folder of weights, state, log and pictures; a stopped training goes on.",
+)
+@click.option(
+    "--validate-on",
+    multiple=True,
+    type=click.Path(path_type=Path, exists=True, file_okay=False),
+    help="Workspace with ground_truth/, or folder of such, to validate with and never "
+    "to train on, such as real photographs; may be repeated. It then says which "
+    "weights are best.",
+)
+@enum_option(
+    "--preset",
+    kind=Preset,
+    default=Preset.DEFAULT,
+    text="What holds for the options below that are not given: what is shown there, or "
+    "the paper's training and network.",
 )
 @config_options(TrainConfig)
 @config_options(NetworkConfig)
-def train(workspaces: tuple[Path, ...], output: Path, **values: Any) -> None:
-    """Train a network on WORKSPACES that have depth maps and a ground_truth folder.
+def train(
+    workspaces: tuple[Path, ...],
+    output: Path,
+    validate_on: tuple[Path, ...],
+    preset: Preset,
+    **values: Any,
+) -> None:
+    """Train a network on WORKSPACES (or folders of such) that have a ground_truth/.
 
-    The path of the weights is printed, for `refine --weights`.
+    Depth maps that are there are used, unfiltered and filtered; where there are none,
+    they are matched first. `torchrun -m resdepth_colmap train ...` trains in several
+    processes. The path of the weights is printed, for `refine --weights`.
     """
-    config = build_config(TrainConfig, values)
+    config = TrainConfig.of(preset, given_values(TrainConfig, values))
     given = given_values(NetworkConfig, values)
     from resdepth_colmap.cli.log import BarProgress
     from resdepth_colmap.training.beginning import chosen_network
     from resdepth_colmap.training.loop import train as run_training
 
-    network_config = chosen_network(config, given)
-    path = run_training(workspaces, output, network_config, config, BarProgress())
+    network_config = chosen_network(config, given, preset)
+    path = run_training(
+        workspaces, output, network_config, config, BarProgress(), validate_on
+    )
     click.echo(path)

@@ -6,29 +6,38 @@ from typing import Any
 
 import torch
 
-from resdepth_colmap.config import TrainConfig
 from resdepth_colmap.errors import ConfigError
-from resdepth_colmap.network.network_config import NetworkConfig
+from resdepth_colmap.network.network_config import InputVariant, NetworkConfig
 from resdepth_colmap.network.unet import ResDepthNet
 from resdepth_colmap.network.weights import default_weights_path, load_weights
+from resdepth_colmap.training.train_config import Preset, TrainConfig
 
 SHIPPED = Path("shipped")
 """As the file to start from: the weights that come with the package."""
 
 
-def chosen_network(config: TrainConfig, options: Mapping[str, Any]) -> NetworkConfig:
+def chosen_network(
+    config: TrainConfig,
+    options: Mapping[str, Any],
+    preset: Preset = Preset.DEFAULT,
+) -> NetworkConfig:
     """The network that these options ask for.
 
     Args:
         config: Its `init` may name weights, whose network it then is.
         options: Attributes of `NetworkConfig` that were asked for.
+        preset: What holds for the others.
 
     Raises:
         WeightsError: If the weights to start from cannot be read.
         ConfigError: If they are of another network than the options say.
     """
     if config.init is None:
-        return NetworkConfig.from_mapping(dict(options))
+        base = NetworkConfig()
+        if preset is Preset.PAPER:
+            variant = options.get("variant", base.variant)
+            base = NetworkConfig.paper(InputVariant(variant))
+        return NetworkConfig.from_mapping({**base.to_mapping(), **options})
     path = _path(config.init)
     theirs = load_weights(path).config
     ours = NetworkConfig.from_mapping({**theirs.to_mapping(), **options})

@@ -1,6 +1,7 @@
 """Random crops of training samples, in batches."""
 
 import dataclasses
+import functools
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -13,7 +14,13 @@ from torch import Tensor
 from resdepth_colmap.errors import TrainingError
 from resdepth_colmap.network.network_config import NetworkConfig
 from resdepth_colmap.pipeline.inputs import InputStack, network_input
-from resdepth_colmap.training.samples import Sample, read_sample
+from resdepth_colmap.training.samples import (
+    HOLES,
+    Sample,
+    guidance_names,
+    read_sample,
+    sample_size,
+)
 
 NEAR_TRUTH_WEIGHT = (0.3, 3.0)
 """Range of the weight that turns errors of inverse depth into relative ones."""
@@ -27,7 +34,8 @@ class Batch(NamedTuple):
         target: True inverse depth, normalised as the input is, shape (B, 1, H, W).
         known: Where there is truth, shape (B, 1, H, W), bool.
         weight: Weight of each pixel, shape (B, 1, H, W).
-        names: The samples' names, for the message when a loss is not a number.
+        names: Names of the samples of all processes, for the message when a loss is
+            not a number.
     """
 
     inputs: Tensor
@@ -36,6 +44,16 @@ class Batch(NamedTuple):
     weight: Tensor
     names: tuple[str, ...]
 
+    def to(self, device: torch.device) -> "Batch":
+        """The same on a device."""
+        return Batch(
+            inputs=self.inputs.to(device),
+            target=self.target.to(device),
+            known=self.known.to(device),
+            weight=self.weight.to(device),
+            names=self.names,
+        )
+
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class CropSampler:
@@ -43,11 +61,13 @@ class CropSampler:
 
     Attributes:
         paths: The samples.
-        config: The network that they were made for.
-        batch_size: Crops in a batch.
+        config: The network that sees them.
+        batch_size: Crops in a batch, over all processes.
         crop_px: Largest side of a crop; smaller where an image is smaller.
         seed: Seed of all choices.
         holes_share: Share of samples whose maps have holes.
+        vary_light: Change brightness and contrast at random.
+        relative: Weigh pixels so that their errors are relative to the depth.
     """
 
     paths: tuple[Path, ...]
@@ -56,48 +76,87 @@ class CropSampler:
     crop_px: int
     seed: int
     holes_share: float = 0.2
+    vary_light: bool = True
+    relative: bool = True
 
-    def batch(self, step: int) -> Batch:
-        """The batch of a step: crop, flip, change brightness, normalise."""
-        rng = np.random.default_rng((self.seed, step))
-        holes = [path for path in self.paths if path.stem.endswith("-holes")]
-        dense = [path for path in self.paths if not path.stem.endswith("-holes")]
-        pools = [
-            holes if holes and rng.random() < self.holes_share else dense
-            for _ in range(self.batch_size)
-        ]
-        chosen = [pool[int(rng.integers(len(pool)))] for pool in pools]
-        crops = [self._crop(read_sample(path), rng) for path in chosen]
+    def batch(self, step: int, rank: int = 0, num_ranks: int = 1) -> Batch:
+        """The batch of a step: crop, flip, change brightness, normalise.
+
+        Args:
+            step: Which one.
+            rank: Number of this process.
+            num_ranks: Number of processes; each gets its part of the same batch.
+
+        Raises:
+            TrainingError: If an image is too small for the network.
+        """
+        draws = [self._draw(step, item) for item in range(self.batch_size)]
+        sizes = np.array([sample_size(path) for path, _ in draws])
+        size = sizes.min(axis=0)
+        own = draws[rank::num_ranks]
+        crops = [self._crop(path, size, rng) for path, rng in own]
         stack = InputStack(
             inverse_depth=_stacked([crop.inverse_depth[None] for crop in crops]),
             valid=_stacked([crop.valid[None] for crop in crops]),
             guidance=_stacked([crop.guidance.astype(np.float32) for crop in crops]),
-            baseline=_stacked([crop.baseline[:, None, None] for crop in crops]),
+            baseline=_stacked([self._baseline(crop) for crop in crops]),
         )
         inputs, scaling = network_input(stack, self.config)
         target = _stacked([crop.target[None] for crop in crops])
         known = target > 0
-        weight = scaling.offset / torch.where(known, target, scaling.offset)
+        weight = torch.ones_like(target)
+        if self.relative:
+            weight = scaling.offset / torch.where(known, target, scaling.offset)
         return Batch(
             inputs=inputs,
             target=scaling.normalise(target),
             known=known,
             weight=weight.clamp(*NEAR_TRUTH_WEIGHT),
-            names=tuple(path.stem for path in chosen),
+            names=tuple(path.stem for path, _ in draws),
         )
 
-    def _crop(self, sample: Sample, rng: np.random.Generator) -> Sample:
-        multiple_px = self.config.multiple_px
-        height, width = sample.target.shape
-        rows = _window(height, self.crop_px, multiple_px, rng)
-        columns = _window(width, self.crop_px, multiple_px, rng)
+    @functools.cached_property
+    def _pools(self) -> tuple[tuple[Path, ...], tuple[Path, ...]]:
+        """Samples without and with holes; neither is empty."""
+        holes = tuple(path for path in self.paths if path.stem.endswith(HOLES))
+        dense = tuple(path for path in self.paths if not path.stem.endswith(HOLES))
+        return dense or holes, holes or dense
+
+    @functools.cached_property
+    def _channels(self) -> list[int]:
+        """Which channels of a sample the network sees."""
+        names = guidance_names(self.config.num_sources)
+        wanted = [name for name in self.config.channels if name != "inverse_depth"]
+        return [names.index(name) for name in wanted]
+
+    def _draw(self, step: int, item: int) -> tuple[Path, np.random.Generator]:
+        """A sample, and what decides on its crop: the same in every process."""
+        rng = np.random.default_rng((self.seed, step, item))
+        dense, holes = self._pools
+        pool = holes if rng.random() < self.holes_share else dense
+        return pool[int(rng.integers(len(pool)))], rng
+
+    def _crop(
+        self, path: Path, size: NDArray[np.int_], rng: np.random.Generator
+    ) -> Sample:
+        """A window of a sample, mirrored in half of the cases.
+
+        The sources in it were warped into the reference camera before: mirrored
+        together, all channels are those of a mirrored pair of views. (Mirroring the
+        photographs and warping then would need mirrored poses.)
+        """
+        sample = read_sample(path)
+        limits = zip(sample.target.shape, size, strict=True)
+        rows, columns = (self._window(path, *limit, rng) for limit in limits)
         flip = -1 if rng.random() < 0.5 else 1
 
         def cut(values: NDArray) -> NDArray:  # type: ignore[type-arg] # any dtype
             cropped = values[..., rows, columns][..., ::flip]
             return np.ascontiguousarray(cropped)
 
-        guidance = self._other_light(cut(sample.guidance).astype(np.float32), rng)
+        guidance = cut(sample.guidance[self._channels]).astype(np.float32)
+        if self.vary_light:
+            guidance = self._other_light(guidance, rng)
         return Sample(
             inverse_depth=cut(sample.inverse_depth),
             target=cut(sample.target),
@@ -105,6 +164,25 @@ class CropSampler:
             guidance=guidance.astype(np.float16),
             baseline=sample.baseline,
         )
+
+    def _window(
+        self, path: Path, size_px: int, least_px: int, rng: np.random.Generator
+    ) -> slice:
+        """A window as long as the crop, but no longer than the batch's least image."""
+        multiple_px = self.config.multiple_px
+        length = min(self.crop_px, least_px) // multiple_px * multiple_px
+        if length == 0:
+            raise TrainingError(
+                f"{path.stem}: a side of {size_px} px (or the crop of {self.crop_px} "
+                f"px) is too small for a network of {self.config.levels} levels, which "
+                f"needs {multiple_px} px; leave it out or train with fewer levels."
+            )
+        start = int(rng.integers(size_px - length + 1))
+        return slice(start, start + length)
+
+    def _baseline(self, crop: Sample) -> NDArray[np.float32]:
+        own = crop.baseline[:1] if self.config.uses_sources else crop.baseline[1:]
+        return own[:, None, None]
 
     def _other_light(
         self, guidance: NDArray[np.float32], rng: np.random.Generator
@@ -123,16 +201,3 @@ class CropSampler:
 
 def _stacked(arrays: Sequence[NDArray]) -> Tensor:  # type: ignore[type-arg] # any dtype
     return torch.from_numpy(np.stack(arrays))
-
-
-def _window(
-    size_px: int, crop_px: int, multiple_px: int, rng: np.random.Generator
-) -> slice:
-    length = min(crop_px, size_px) // multiple_px * multiple_px
-    if length == 0:
-        raise TrainingError(
-            f"an image side of {size_px} px is too small for a network that halves it "
-            f"to 1/{multiple_px}; train on larger images or with fewer levels."
-        )
-    start = int(rng.integers(size_px - length + 1))
-    return slice(start, start + length)

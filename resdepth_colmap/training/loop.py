@@ -1,46 +1,41 @@
 """The training loop: seeded, resumable, stopped by a loss that is not a number."""
 
-import csv
-import logging
+import collections
 import math
-from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
+import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
-from typing import NamedTuple
 
 import torch
 
-from resdepth_colmap.config import TrainConfig
 from resdepth_colmap.errors import TrainingError
+from resdepth_colmap.io.images import write_png
 from resdepth_colmap.network.network_config import NetworkConfig
-from resdepth_colmap.network.unet import ResDepthNet
-from resdepth_colmap.network.weights import save_weights
-from resdepth_colmap.pipeline.progress import Progress, SilentProgress
+from resdepth_colmap.pipeline.depth_strip import BeforeAfter, depth_strip
+from resdepth_colmap.pipeline.progress import Advance, Progress, SilentProgress
 from resdepth_colmap.training.beginning import fresh_network
-from resdepth_colmap.training.crops import Batch, CropSampler
-from resdepth_colmap.training.loss import refinement_loss
-from resdepth_colmap.training.samples import prepare_samples
+from resdepth_colmap.training.checkpoint import (
+    BEST_NAME,
+    STATE_NAME,
+    WEIGHTS_NAME,
+    load_state,
+    save_best,
+    save_state,
+)
+from resdepth_colmap.training.crops import Batch
+from resdepth_colmap.training.curves import draw_curves
+from resdepth_colmap.training.data import Data, Places, prepare_data
+from resdepth_colmap.training.optimisation import Optimisation
+from resdepth_colmap.training.ranks import join_ranks
+from resdepth_colmap.training.stop_request import StopRequest, stop_request
+from resdepth_colmap.training.train_config import TrainConfig
+from resdepth_colmap.training.training_log import Row, TrainingLog
+from resdepth_colmap.training.validation import mean_loss
 
-logger = logging.getLogger(__name__)
-
-VALIDATION_SHARE = 20  # one workspace of so many is held out
-VALIDATION_BATCHES = 8
-WARM_UP_SHARE = 0.05
-LARGEST_GRADIENT = 1.0
-
-
-class Run(NamedTuple):
-    """All that changes while training.
-
-    Attributes:
-        network: The network.
-        optimiser: Adam with decoupled weight decay.
-        schedule: One cycle of the learning rate, a value a step.
-    """
-
-    network: ResDepthNet
-    optimiser: torch.optim.AdamW
-    schedule: torch.optim.lr_scheduler.OneCycleLR
+CURVES_NAME = "curves.png"
+PREDICTIONS_FOLDER = "predictions"
+BATCHES_AHEAD = 2  # of each loader
 
 
 def train(
@@ -49,153 +44,179 @@ def train(
     network_config: NetworkConfig,
     config: TrainConfig,
     progress: Progress | None = None,
+    validate_on: Sequence[Path] = (),
 ) -> Path:
     """Train a network on workspaces with ground truth, or go on where it stopped.
 
+    Under torchrun each process takes its part of each batch; the first one logs,
+    validates and saves.
+
     Args:
-        workspaces: Dense workspaces with depth maps and `ground_truth/`; one of every
-            twenty is held out for validation.
-        output: Folder of the samples, `state.pt`, `log.csv` and `weights.safetensors`.
+        workspaces: Dense workspaces with `ground_truth/`, or folders of such; those
+            without depth maps are matched first.
+        output: Folder of the samples, the state, the weights, the log and its pictures.
         network_config: The network to train.
         config: How.
         progress: Is told of each step.
+        validate_on: More workspaces with `ground_truth/`, never trained on. Where
+            there are any, they say which weights are best, else held-out scenes do.
 
     Returns:
-        Path of the weights.
+        Path of the best weights; of the last ones if nothing was validated.
 
     Raises:
-        TrainingError: Without samples, or when the loss is not a number.
+        TrainingError: Without samples, when the loss is not a number, or if the output
+            folder holds a training with other options.
+        WorkspaceError: If a workspace is broken.
         WeightsError: If the weights to start from cannot be read.
         ConfigError: If they are of another network than `network_config`.
+        KeyboardInterrupt: After Ctrl-C or SIGTERM; the state is saved.
     """
-    progress = progress or SilentProgress()
-    network = fresh_network(network_config, config)
-    held_out = workspaces[VALIDATION_SHARE - 1 :: VALIDATION_SHARE]
-    used = [path for path in workspaces if path not in held_out]
-    cache = output / "samples"
-    sampler = _sampler(used, cache, network_config, config, progress)
-    validation = (
-        _sampler(held_out, cache, network_config, config, progress)
-        if held_out
-        else None
-    )
-    run = _start(network, config)
-    first = _resume(run, output / "state.pt")
-    with (
-        progress.stage("Training", config.steps) as advance,
-        ThreadPoolExecutor(max_workers=1) as loader,
-    ):
-        advance(first)
-        following = loader.submit(sampler.batch, first)
-        total = 0.0
-        for step in range(first, config.steps):
-            batch = following.result()
-            following = loader.submit(sampler.batch, step + 1)
-            total += _step(run, batch, step)
+    with join_ranks(config.device) as ranks:
+        if progress is None or not ranks.is_first:
+            progress = SilentProgress()
+        ranks.check_batch(config.batch_size)
+        network = fresh_network(network_config, config)
+        places = Places(workspaces, validate_on, output)
+        data = prepare_data(places, network_config, config, ranks, progress)
+        torch.backends.cudnn.deterministic = True  # resumable to the bit on GPUs too
+        run = Optimisation.start(network, config, ranks)
+        with (
+            stop_request() as stop,
+            progress.stage("Training", config.steps) as advance,
+        ):
+            _Loop(run, data, output, stop).run(advance)
+    best = output / BEST_NAME
+    return best if best.is_file() else output / WEIGHTS_NAME
+
+
+class _Loop:
+    """Steps, and what the first process does between them."""
+
+    def __init__(
+        self, optimisation: Optimisation, data: Data, output: Path, stop: StopRequest
+    ) -> None:
+        self.optimisation = optimisation
+        self.config, self.ranks = optimisation.config, optimisation.ranks
+        self.data = data
+        self.output = output
+        self.stop = stop
+        self.position = load_state(output, optimisation)
+        self.log: TrainingLog | None = None
+
+    def run(self, advance: Advance) -> None:
+        """Take the steps that are left."""
+        advance(self.position.step)
+        if self.position.step >= self.config.steps:
+            return
+        if self.ranks.is_first:
+            self.log = TrainingLog(
+                self.output, self.position.step, self.config.tensorboard
+            )
+        try:
+            self._run(advance)
+        finally:
+            if self.log is not None:
+                self.log.close()
+
+    def _run(self, advance: Advance) -> None:
+        start = time.perf_counter()
+        if self.log is not None and self.config.init and not self.position.step:
+            self.log.add({"step": 0, **self._validate(self.log)})  # what to beat
+        for batch in self._batches():
+            value, wants_stop = self._step(batch)
+            self.position.step += 1
+            self.position.loss_sum += value
+            self.position.loss_count += 1
             advance(1.0)
-            done = step + 1
-            if done % config.checkpoint_steps == 0 or done == config.steps:
-                since = (done - 1) % config.checkpoint_steps + 1
-                held_out_loss = _validate(run.network, validation)
-                _log(output / "log.csv", done, total / since, held_out_loss)
-                _save(run, output, done)
-                total = 0.0
-    return output / "weights.safetensors"
+            if self.log is not None:
+                now = time.perf_counter()
+                if self._report(self.log, now - start):
+                    start = time.perf_counter()
+                if wants_stop or self._is_due(self.config.checkpoint_steps):
+                    save_state(self.output, self.optimisation, self.position)
+            if wants_stop:
+                raise KeyboardInterrupt
+            if self._is_due(self.config.validation_steps):
+                self.ranks.summed([0.0])  # the others wait for the first
 
+    def _step(self, batch: Batch) -> tuple[float, bool]:
+        try:
+            return self.optimisation.step(batch, self.stop.is_made)
+        except TrainingError as error:
+            state = self.output / STATE_NAME
+            kept = f"{state} is the last good state" if state.exists() else "not saved"
+            raise TrainingError(
+                f"step {self.position.step}: {error}; {kept}. Look at these samples' "
+                "depth maps, or lower --learning-rate."
+            ) from error
 
-def _sampler(
-    workspaces: Sequence[Path],
-    cache: Path,
-    network_config: NetworkConfig,
-    config: TrainConfig,
-    progress: Progress,
-) -> CropSampler:
-    return CropSampler(
-        paths=tuple(prepare_samples(workspaces, network_config, cache, progress)),
-        config=network_config,
-        batch_size=config.batch_size,
-        crop_px=config.crop_px,
-        seed=config.seed,
-    )
+    def _batches(self) -> Iterator[Batch]:
+        """The batches that are left, cut by other threads ahead of time."""
+        sampler, ranks = self.data.training, self.ranks
+        steps = iter(range(self.position.step, self.config.steps))
+        pending: collections.deque[Future[Batch]] = collections.deque()
+        loader = ThreadPoolExecutor(max_workers=self.config.loaders)
+        try:
+            while True:
+                while len(pending) < BATCHES_AHEAD * self.config.loaders:
+                    step = next(steps, None)
+                    if step is None:
+                        break
+                    pending.append(
+                        loader.submit(sampler.batch, step, ranks.rank, ranks.count)
+                    )
+                if not pending:
+                    return
+                yield pending.popleft().result()
+        finally:
+            loader.shutdown(cancel_futures=True)
 
+    def _is_due(self, every: int) -> bool:
+        step = self.position.step
+        return step % every == 0 or step == self.config.steps
 
-def _start(network: ResDepthNet, config: TrainConfig) -> Run:
-    network = network.to(memory_format=torch.channels_last)  # type: ignore[call-overload] # torch's stubs lack the keyword
-    optimiser = torch.optim.AdamW(
-        network.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay
-    )
-    schedule = torch.optim.lr_scheduler.OneCycleLR(
-        optimiser,
-        max_lr=config.learning_rate,
-        total_steps=config.steps + 1,
-        pct_start=WARM_UP_SHARE,
-    )
-    return Run(network, optimiser, schedule)
-
-
-def _step(run: Run, batch: Batch, step: int) -> float:
-    run.network.train()
-    inputs = batch.inputs.contiguous(memory_format=torch.channels_last)
-    loss = refinement_loss(run.network(inputs), batch.target, batch.known, batch.weight)
-    value = float(loss.detach())
-    if not math.isfinite(value):
-        raise TrainingError(
-            f"the loss of step {step} is {value}; its batch: {', '.join(batch.names)}."
+    def _report(self, log: TrainingLog, seconds: float) -> bool:
+        """Write a line of the log where one is due, after validating where that is."""
+        validates = self._is_due(self.config.validation_steps) and (
+            self.data.held_out is not None or bool(self.data.sets)
         )
-    run.optimiser.zero_grad(set_to_none=True)
-    loss.backward()  # type: ignore[no-untyped-call] # torch's own
-    torch.nn.utils.clip_grad_norm_(run.network.parameters(), LARGEST_GRADIENT)
-    run.optimiser.step()
-    run.schedule.step()
-    return value
+        if not validates and not self._is_due(self.config.checkpoint_steps):
+            return False
+        position = self.position
+        row = {
+            "step": position.step,
+            "learning_rate": self.optimisation.learning_rate,
+            "loss": position.loss_sum / position.loss_count,
+            **(self._validate(log) if validates else {}),
+            "seconds": seconds,
+        }
+        log.add(row)
+        write_png(self.output / CURVES_NAME, draw_curves(log.rows))
+        position.loss_sum, position.loss_count = 0.0, 0
+        return True
 
+    def _validate(self, log: TrainingLog) -> Row:
+        """Refine views; keep the weights if none were better."""
+        network, step = self.optimisation.network, self.position.step
+        row: Row = {}
+        if self.data.held_out is not None:
+            row["held_out_loss"] = mean_loss(network, self.data.held_out, self.config)
+        score = math.inf
+        for views in self.data.sets:  # the watched ones, if any, are the last
+            scores, pictures = views.measure(network)
+            row |= {f"{views.name}_{k}": v for k, v in scores._asdict().items()}
+            score = scores.score
+            for place, picture in enumerate(pictures):
+                self._draw(log, f"{views.name}_{place}", picture, step)
+        if score < self.position.best_score:
+            self.position.best_score = score
+            save_best(self.output, self.optimisation, step, row)
+        return row
 
-@torch.inference_mode()
-def _validate(network: ResDepthNet, sampler: CropSampler | None) -> float:
-    """Mean loss over the same few batches of held-out scenes; NaN if there are none."""
-    if sampler is None:
-        return math.nan
-    network.eval()
-    total = 0.0
-    for index in range(VALIDATION_BATCHES):
-        batch = sampler.batch(index)
-        refined = network(batch.inputs)
-        total += float(
-            refinement_loss(refined, batch.target, batch.known, batch.weight)
-        )
-    return total / VALIDATION_BATCHES
-
-
-def _save(run: Run, output: Path, step: int) -> None:
-    state = {
-        "step": step,
-        "network": run.network.state_dict(),
-        "optimiser": run.optimiser.state_dict(),
-        "schedule": run.schedule.state_dict(),
-    }
-    partial = output / "state.pt.partial"
-    torch.save(state, partial)
-    partial.replace(output / "state.pt")
-    save_weights(output / "weights.safetensors", run.network, {"steps": str(step)})
-
-
-def _resume(run: Run, path: Path) -> int:
-    """Load the last state, if there is one; returns the step to go on with."""
-    if not path.exists():
-        return 0
-    state = torch.load(path, weights_only=True)
-    run.network.load_state_dict(state["network"])
-    run.optimiser.load_state_dict(state["optimiser"])
-    run.schedule.load_state_dict(state["schedule"])
-    logger.info("Going on after step %d of %s.", state["step"], path)
-    return int(state["step"])
-
-
-def _log(path: Path, step: int, loss: float, held_out_loss: float) -> None:
-    is_new = not path.exists()
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("a", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        if is_new:
-            writer.writerow(["step", "loss", "held_out_loss"])
-        writer.writerow([step, f"{loss:.5f}", f"{held_out_loss:.5f}"])
+    def _draw(
+        self, log: TrainingLog, name: str, picture: BeforeAfter, step: int
+    ) -> None:
+        strip = depth_strip(picture)
+        write_png(self.output / PREDICTIONS_FOLDER / f"{name}.png", strip)
+        log.add_picture(name, strip, step)

@@ -1,22 +1,34 @@
 """What the training minimises."""
 
+from typing import NamedTuple
+
 import torch
 from torch import Tensor
 
 from resdepth_colmap.network.unet import Refinement
+from resdepth_colmap.training.crops import Batch
+from resdepth_colmap.training.train_config import TrainConfig
 
 SMALL_ERROR = 0.02
 """Errors below this share of a tile's spread are in the logarithm's steep part."""
 
-LOG_WEIGHT = 0.1
-CONFIDENCE_WEIGHT = 0.05
 LARGEST_ERROR = 8.0
 """Beyond it an error says no more about the scale that the confidence should have."""
 
 
-def refinement_loss(
-    refined: Refinement, target: Tensor, known: Tensor, weight: Tensor
-) -> Tensor:
+class LossSum(NamedTuple):
+    """A loss that can be added over processes; the loss is `total / num_known`.
+
+    Attributes:
+        total: Sum over the pixels whose truth is known, a scalar with gradient.
+        num_known: Number of these pixels, a scalar.
+    """
+
+    total: Tensor
+    num_known: Tensor
+
+
+def refinement_loss(refined: Refinement, batch: Batch, config: TrainConfig) -> LossSum:
     """L1, a logarithmic term and the likelihood of the predicted scale.
 
     L1 (paper, section "Network Training") leaves pixels alone that are nearly right:
@@ -26,20 +38,19 @@ def refinement_loss(
 
     Args:
         refined: The network's output, normalised.
-        target: True inverse depth, normalised alike, shape (B, 1, H, W).
-        known: Where there is truth, shape (B, 1, H, W), bool.
-        weight: Weight of each pixel's error, shape (B, 1, H, W).
-
-    Returns:
-        The mean over the known pixels, a scalar; 0 if there are none.
+        batch: Truth and weights, normalised alike.
+        config: Weights of the terms; of a term without weight nothing is computed.
     """
-    known_float = known.to(target.dtype)
-    distance = (refined.inverse_depth - torch.where(known, target, 0.0)).abs()
-    error = distance * weight
-    value = error + LOG_WEIGHT * torch.log1p(error / SMALL_ERROR)
-    if refined.log_scale is not None:
+    known = batch.known.to(batch.target.dtype)
+    truth = torch.where(batch.known, batch.target, 0.0)
+    distance = (refined.inverse_depth - truth).abs()
+    error = distance * batch.weight
+    value = error
+    if config.log_weight:
+        value = value + config.log_weight * torch.log1p(error / SMALL_ERROR)
+    if config.confidence_weight and refined.log_scale is not None:
         seen = distance.detach().clamp(max=LARGEST_ERROR)
         log_scale = refined.log_scale.clamp(-8.0, 4.0)
         likelihood = seen * torch.exp(-log_scale) + log_scale
-        value = value + CONFIDENCE_WEIGHT * likelihood
-    return (value * known_float).sum() / known_float.sum().clamp(min=1.0)
+        value = value + config.confidence_weight * likelihood
+    return LossSum((value * known).sum(), known.sum())

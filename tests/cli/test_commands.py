@@ -1,8 +1,6 @@
 """Each command on a small workspace: run it, then open what it wrote."""
 
 import json
-import sys
-import types
 from pathlib import Path
 
 import numpy as np
@@ -170,32 +168,3 @@ def test_stereo_keeps_maps_that_are_there(tmp_path: Path) -> None:
     assert "matched   0 images" in text
     assert "kept      5 images" in text
     assert path.stat().st_mtime_ns == before
-
-
-def test_train_passes_its_options_on(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    seen: list[object] = []
-
-    def fake(*arguments: object) -> Path:
-        seen.extend(arguments)
-        return tmp_path / "weights.safetensors"
-
-    loop = types.SimpleNamespace(train=fake)
-    monkeypatch.setitem(sys.modules, "resdepth_colmap.training.loop", loop)
-    result = run(
-        "train",
-        tmp_path,
-        "--output",
-        tmp_path,
-        "--steps",
-        7,
-        "--no-gate",
-        "--levels",
-        3,
-    )
-    assert result.stdout == f"{tmp_path / 'weights.safetensors'}\n"
-    _, output, network, config, _ = seen
-    assert output == tmp_path
-    assert (network.levels, network.gate) == (3, False)  # type: ignore[attr-defined]
-    assert config.steps == 7  # type: ignore[attr-defined]

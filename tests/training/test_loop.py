@@ -7,17 +7,19 @@ import pytest
 import torch
 from planes import write_plane_workspace
 
-from resdepth_colmap.config import TrainConfig
-from resdepth_colmap.errors import TrainingError
+from resdepth_colmap.errors import TrainingError, WorkspaceError
 from resdepth_colmap.io.depth_map import read_depth_map, write_depth_map
 from resdepth_colmap.network.network_config import NetworkConfig
 from resdepth_colmap.network.weights import load_weights
 from resdepth_colmap.training.crops import CropSampler
 from resdepth_colmap.training.loop import train
 from resdepth_colmap.training.samples import prepare_samples
+from resdepth_colmap.training.train_config import TrainConfig
 
 NETWORK = NetworkConfig(levels=3, base_channels=4, max_channels=8)
-TRAINING = TrainConfig(steps=4, batch_size=2, crop_px=32, checkpoint_steps=2)
+TRAINING = TrainConfig(
+    steps=4, batch_size=2, crop_px=32, checkpoint_steps=2, tensorboard=False
+)
 
 
 @pytest.fixture
@@ -79,7 +81,7 @@ def test_the_log_has_a_line_for_each_checkpoint(
 ) -> None:
     train([workspace], tmp_path / "run", NETWORK, TRAINING)
     lines = (tmp_path / "run" / "log.csv").read_text().splitlines()
-    assert lines[0] == "step,loss,held_out_loss"
+    assert lines[0].startswith("step,learning_rate,loss,held_out_loss,")
     assert [line.split(",")[0] for line in lines[1:]] == ["2", "4"]
 
 
@@ -91,7 +93,7 @@ def test_training_on_one_scene_lowers_its_loss(workspace: Path, tmp_path: Path) 
     network = NetworkConfig(levels=3, base_channels=16, max_channels=32)
     train([workspace], tmp_path / "run", network, config)
     lines = (tmp_path / "run" / "log.csv").read_text().splitlines()[1:]
-    losses = [float(line.split(",")[1]) for line in lines]
+    losses = [float(line.split(",")[2]) for line in lines]
     assert losses[-1] < 0.6 * losses[0]
 
 
@@ -104,13 +106,15 @@ def test_a_loss_that_is_no_number_names_its_batch(
             changed = {name: arrays[name] for name in arrays.files}
         changed["inverse_depth"] = np.full_like(changed["inverse_depth"], np.nan)
         np.savez(path, **changed)
-    with pytest.raises(TrainingError, match=r"step 0 is nan.*plane-"):
+    with pytest.raises(
+        TrainingError, match=r"step 0: the loss is nan.*plane-.*not saved"
+    ):
         train([workspace], output, NETWORK, TRAINING)
 
 
 def test_a_workspace_without_truth_says_what_is_missing(tmp_path: Path) -> None:
     write_plane_workspace(tmp_path / "plane", kinds=())
-    with pytest.raises(TrainingError, match="ground_truth"):
+    with pytest.raises(WorkspaceError, match="plane: no ground_truth"):
         train([tmp_path / "plane"], tmp_path / "run", NETWORK, TRAINING)
 
 

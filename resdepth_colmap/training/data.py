@@ -1,0 +1,125 @@
+"""What is trained on and what is validated with."""
+
+import logging
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from resdepth_colmap.errors import TrainingError
+from resdepth_colmap.network.network_config import NetworkConfig
+from resdepth_colmap.pipeline.progress import Progress
+from resdepth_colmap.training.crops import CropSampler
+from resdepth_colmap.training.ranks import Ranks
+from resdepth_colmap.training.samples import prepare_samples
+from resdepth_colmap.training.scenes import (
+    Split,
+    check_apart,
+    find_scenes,
+    split_scenes,
+)
+from resdepth_colmap.training.train_config import TrainConfig
+from resdepth_colmap.training.validation import ValidationSet
+
+CACHE_FOLDER = "samples"
+
+logger = logging.getLogger(__name__)
+
+
+class Places(NamedTuple):
+    """Where the data comes from and where it is kept.
+
+    Attributes:
+        workspaces: Workspaces to train on and to hold out, or folders of such.
+        validate_on: More workspaces, only to validate with.
+        output: Folder of the training.
+    """
+
+    workspaces: Sequence[Path]
+    validate_on: Sequence[Path]
+    output: Path
+
+
+class Data(NamedTuple):
+    """What is trained on and what is validated with.
+
+    Attributes:
+        training: Crops to train on.
+        held_out: Crops of held-out scenes; None if there are none.
+        sets: Views to refine, of held-out and of watched scenes; only the first process
+            has any.
+    """
+
+    training: CropSampler
+    held_out: CropSampler | None
+    sets: tuple[ValidationSet, ...]
+
+
+def prepare_data(
+    places: Places,
+    network_config: NetworkConfig,
+    config: TrainConfig,
+    ranks: Ranks,
+    progress: Progress,
+) -> Data:
+    """Split the scenes, and make the samples in the first process.
+
+    Raises:
+        TrainingError: If there is nothing to train on, or a scene is to be trained on
+            and to be validated with.
+        WorkspaceError: If a workspace is broken, or cannot be matched.
+    """
+    scenes, watched = find_scenes(places.workspaces), find_scenes(places.validate_on)
+    check_apart(scenes, watched)
+    split = split_scenes(scenes, config.validation_share)
+    cache = places.output / CACHE_FOLDER
+
+    def make() -> tuple[tuple[Path, ...], ...]:
+        return tuple(
+            tuple(prepare_samples(part, network_config, cache, progress))
+            for part in split
+        )
+
+    training, held_out = (
+        CropSampler(
+            paths=paths,
+            config=network_config,
+            batch_size=config.batch_size,
+            crop_px=config.crop_px,
+            seed=config.seed,
+            holes_share=config.holes_share,
+            vary_light=config.vary_light,
+            relative=config.relative,
+        )
+        for paths in ranks.from_first(make)
+    )
+    if not training.paths:
+        raise TrainingError(
+            f"{scenes[0]}: no view has both a true depth map in ground_truth/ and a "
+            "depth map in stereo/depth_maps/ that is right at least here and there; "
+            "check that the names are <image>.bin and the units those of the model."
+        )
+    sets = _validation_sets(split, watched, config) if ranks.is_first else ()
+    if ranks.is_first:
+        _say(split, watched, len(training.paths))
+    return Data(training, held_out if held_out.paths else None, sets)
+
+
+def _validation_sets(
+    split: Split, watched: Sequence[Path], config: TrainConfig
+) -> tuple[ValidationSet, ...]:
+    named = {"held_out": split.held_out, "watched": watched}
+    return tuple(
+        ValidationSet.of(name, scenes, config.validation_views)
+        for name, scenes in named.items()
+        if scenes
+    )
+
+
+def _say(split: Split, watched: Sequence[Path], num_samples: int) -> None:
+    logger.info(
+        "%d samples of %d scenes; %d scenes are held out, %d watched.",
+        num_samples,
+        len(split.training),
+        len(split.held_out),
+        len(watched),
+    )

@@ -1,0 +1,172 @@
+"""Views with an initial map and a true one: what there is to learn from, and to check.
+
+Each map of a view counts by itself: unfiltered and filtered ones have other mistakes.
+"""
+
+import dataclasses
+import logging
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from resdepth_colmap.config import StereoConfig
+from resdepth_colmap.geometry.view_selection import choose_sources
+from resdepth_colmap.io.depth_map import read_depth_map
+from resdepth_colmap.io.model import read_scene
+from resdepth_colmap.io.workspace import Workspace, open_workspace
+from resdepth_colmap.pipeline.initial_map import (
+    candidate_kinds,
+    check_map_size,
+    map_path,
+)
+from resdepth_colmap.pipeline.progress import Progress, SilentProgress
+from resdepth_colmap.pipeline.refine import ViewInputs
+from resdepth_colmap.pipeline.stereo import stereo_workspace
+from resdepth_colmap.pipeline.view_images import ViewImages
+from resdepth_colmap.pipeline.view_inputs import view_inputs
+from resdepth_colmap.scene import DepthMap, Scene
+from resdepth_colmap.training.scenes import scene_name
+
+logger = logging.getLogger(__name__)
+
+LEAST_RIGHT_SHARE = 0.3
+"""A map with fewer pixels within 5 % of the truth is of a failed pair: not used."""
+
+LEAST_FILLED_SHARE = 0.05
+
+
+class Loaded(NamedTuple):
+    """A labelled view in memory.
+
+    Attributes:
+        inputs: What the refinement takes.
+        truth: True depth at the size of the map, shape (H, W); 0 = not known.
+    """
+
+    inputs: ViewInputs
+    truth: DepthMap
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
+class LabelledView:
+    """A map of a view whose true depth is known.
+
+    Attributes:
+        workspace: Where it lies.
+        scene: All views.
+        index: Its position in `scene.views`.
+        kind: The kind of its initial map, the word before ".bin".
+    """
+
+    workspace: Workspace
+    scene: Scene
+    index: int
+    kind: str
+
+    @property
+    def image_name(self) -> str:
+        """Name of its image."""
+        return self.scene.views[self.index].name
+
+    @property
+    def name(self) -> str:
+        """Scene, image and kind of map, fit for a file's name."""
+        image = self.image_name.replace("/", "-")
+        return f"{scene_name(self.workspace.path)}-{image}-{self.kind}"
+
+    @property
+    def map_path(self) -> Path:
+        """Its initial depth map."""
+        return map_path(self.workspace, self.image_name, self.kind)
+
+    @property
+    def truth_path(self) -> Path:
+        """Its true depth map."""
+        return self.workspace.truth_path(self.image_name)
+
+    def load(self, num_sources: int) -> Loaded | None:
+        """Read it with so many second views; None if its map is of a failed pair.
+
+        Raises:
+            WorkspaceError: If a file is missing or broken.
+        """
+        view = self.scene.views[self.index]
+        check_map_size(self.map_path, view.camera)
+        depth = read_depth_map(self.map_path)
+        truth = nearest_depth(read_depth_map(self.truth_path), depth.shape)
+        if not _is_usable(depth, truth):
+            return None
+        choices = choose_sources(self.scene, self.index, num_sources)
+        images = ViewImages(self.workspace, 1 + num_sources)
+        sources = [choice.index for choice in choices]
+        inputs = view_inputs(self.scene, self.index, sources, depth, images)
+        return Loaded(inputs, truth)
+
+
+def labelled_views(
+    path: Path, stereo: StereoConfig | None = None, progress: Progress | None = None
+) -> list[LabelledView]:
+    """All maps of a workspace that can be compared with the truth.
+
+    A workspace without any such map is matched first, as `resdepth-colmap stereo` does.
+
+    Args:
+        path: The workspace.
+        stereo: Options of the matcher.
+        progress: Is told of the matching.
+
+    Raises:
+        WorkspaceError: If the workspace is broken, or cannot be matched.
+    """
+    workspace = open_workspace(path)
+    scene = read_scene(workspace.sparse_path, workspace.images_path, workspace.path)
+    with_truth = [
+        index
+        for index, view in enumerate(scene.views)
+        if workspace.truth_path(view.name).is_file()
+    ]
+    views = _with_maps(workspace, scene, with_truth)
+    if with_truth and not views:
+        logger.info("%s has no depth maps: matching.", workspace.path)
+        stereo_workspace(
+            workspace,
+            scene,
+            stereo or StereoConfig(),
+            progress=progress or SilentProgress(),
+        )
+        views = _with_maps(workspace, scene, with_truth)
+    return views
+
+
+def nearest_depth(depth: DepthMap, shape: tuple[int, ...]) -> DepthMap:
+    """A depth map at another size (height, width): never a mean of two depths."""
+    if depth.shape == shape:
+        return depth
+    rows, columns = (
+        ((np.arange(new) + 0.5) * old / new).astype(np.intp)
+        for new, old in zip(shape, depth.shape, strict=True)
+    )
+    return depth[np.ix_(rows, columns)]
+
+
+def _with_maps(
+    workspace: Workspace, scene: Scene, indices: Sequence[int]
+) -> list[LabelledView]:
+    return [
+        LabelledView(workspace=workspace, scene=scene, index=index, kind=kind)
+        for index in indices
+        for kind in candidate_kinds(workspace, scene.views[index].name)
+    ]
+
+
+def _is_usable(depth: DepthMap, truth: DepthMap) -> bool:
+    filled = depth > 0
+    known = filled & (truth > 0)
+    right = np.abs(depth - truth) < 0.05 * truth
+    return bool(
+        filled.mean() >= LEAST_FILLED_SHARE
+        and known.any()
+        and right[known].mean() >= LEAST_RIGHT_SHARE
+    )

@@ -1,0 +1,126 @@
+"""One optimiser step, and all that changes by it."""
+
+import dataclasses
+import math
+
+import torch
+from torch import nn
+from torch.nn.parallel import DistributedDataParallel
+
+from resdepth_colmap.errors import TrainingError
+from resdepth_colmap.network.unet import ResDepthNet
+from resdepth_colmap.training.crops import Batch
+from resdepth_colmap.training.loss import refinement_loss
+from resdepth_colmap.training.ranks import Ranks
+from resdepth_colmap.training.synced_norm import sync_norms
+from resdepth_colmap.training.train_config import Optimiser, Schedule, TrainConfig
+
+WARM_UP_SHARE = 0.05
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
+class Optimisation:
+    """A network in training.
+
+    Attributes:
+        network: The network itself, for validation and for the weights file.
+        model: What is called in a step: the network, or what joins it with those of the
+            other processes.
+        optimiser: Holds the moments of the gradients.
+        schedule: Of the learning rate, a value a step.
+        config: How to train.
+        ranks: The processes.
+    """
+
+    network: ResDepthNet
+    model: nn.Module
+    optimiser: torch.optim.Optimizer
+    schedule: torch.optim.lr_scheduler.LRScheduler
+    config: TrainConfig
+    ranks: Ranks
+
+    @classmethod
+    def start(
+        cls, network: ResDepthNet, config: TrainConfig, ranks: Ranks
+    ) -> "Optimisation":
+        """A training before its first step, on the device of this process."""
+        network = network.to(ranks.device)
+        model: nn.Module = network
+        if ranks.count > 1:
+            sync_norms(network)
+            # The norms see the same numbers everywhere: their buffers need no copy.
+            model = DistributedDataParallel(network, broadcast_buffers=False)
+        else:
+            network = network.to(memory_format=torch.channels_last)  # type: ignore[call-overload] # torch's stubs lack the keyword
+        kinds = {Optimiser.ADAM: torch.optim.Adam, Optimiser.ADAMW: torch.optim.AdamW}
+        optimiser = kinds[config.optimiser](
+            network.parameters(),
+            lr=config.learning_rate,
+            weight_decay=config.weight_decay,
+        )
+        return cls(
+            network=network,
+            model=model,
+            optimiser=optimiser,
+            schedule=_schedule(optimiser, config),
+            config=config,
+            ranks=ranks,
+        )
+
+    @property
+    def learning_rate(self) -> float:
+        """That of the next step."""
+        return float(self.optimiser.param_groups[0]["lr"])
+
+    def step(self, batch: Batch, wants_stop: bool = False) -> tuple[float, bool]:
+        """Take a step.
+
+        Args:
+            batch: The part of this process.
+            wants_stop: Whether this process was asked to stop.
+
+        Returns:
+            The loss over the whole batch; and whether any process was asked to stop.
+
+        Raises:
+            TrainingError: If loss or gradients are not finite; nothing has changed but
+                the running statistics of the norms.
+        """
+        self.model.train()
+        batch = batch.to(self.ranks.device)
+        inputs = batch.inputs.contiguous(memory_format=torch.channels_last)
+        loss = refinement_loss(self.model(inputs), batch, self.config)
+        total, num_known, num_stops = self.ranks.summed(
+            [float(loss.total.detach()), float(loss.num_known), float(wants_stop)]
+        )
+        value = total / max(num_known, 1.0)
+        self._check_finite("loss", value, batch)
+        self.optimiser.zero_grad(set_to_none=True)
+        # The processes' gradients are averaged: count makes a sum of it again.
+        mean = loss.total * (self.ranks.count / max(num_known, 1.0))
+        mean.backward()  # type: ignore[no-untyped-call] # torch's own
+        limit = self.config.largest_gradient or math.inf
+        norm = nn.utils.clip_grad_norm_(self.network.parameters(), limit)
+        self._check_finite("gradient", float(norm), batch)
+        self.optimiser.step()
+        self.schedule.step()
+        return value, num_stops > 0
+
+    def _check_finite(self, what: str, value: float, batch: Batch) -> None:
+        if not math.isfinite(value):
+            raise TrainingError(
+                f"the {what} is {value}; the batch: {', '.join(batch.names)}"
+            )
+
+
+def _schedule(
+    optimiser: torch.optim.Optimizer, config: TrainConfig
+) -> torch.optim.lr_scheduler.LRScheduler:
+    if config.schedule is Schedule.CONSTANT:
+        return torch.optim.lr_scheduler.ConstantLR(optimiser, factor=1.0)
+    return torch.optim.lr_scheduler.OneCycleLR(
+        optimiser,
+        max_lr=config.learning_rate,
+        total_steps=config.steps + 1,
+        pct_start=WARM_UP_SHARE,
+    )

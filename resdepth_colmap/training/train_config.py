@@ -1,0 +1,153 @@
+"""How the network is trained: every option, and the two sets of them with a name."""
+
+import dataclasses
+import enum
+from pathlib import Path
+from typing import Any, Self
+
+from resdepth_colmap.config import Config, Device
+
+
+class Preset(enum.StrEnum):
+    """Options with a name."""
+
+    DEFAULT = "default"
+    PAPER = "paper"
+
+
+class Optimiser(enum.StrEnum):
+    """What turns gradients into steps."""
+
+    ADAM = "adam"  # weight decay is part of the gradient
+    ADAMW = "adamw"  # weight decay is its own
+
+
+class Schedule(enum.StrEnum):
+    """How the learning rate goes."""
+
+    CONSTANT = "constant"
+    ONE_CYCLE = "one-cycle"
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class TrainConfig(Config):
+    """How the network is trained.
+
+    Attributes:
+        steps: Optimiser steps in all.
+        batch_size: Crops a step, over all processes.
+        crop_px: Largest side of a crop, in pixels.
+        learning_rate: Of a constant schedule; the peak of one cycle.
+        weight_decay: The optimiser's weight decay.
+        optimiser: adam (the paper's) or adamw.
+        schedule: Of the learning rate.
+        largest_gradient: Norm that gradients are cut to; 0 = they are not.
+        relative: Weigh errors by the true depth, so that all distances count alike.
+        log_weight: Weight of the logarithmic term, which keeps small errors small.
+        confidence_weight: Weight of the likelihood of the predicted error scale.
+        vary_light: Change brightness and contrast of the crops at random.
+        holes_share: Share of crops from maps that are filtered, or look like it.
+        checkpoint_steps: Save the state every so many steps.
+        validation_steps: Refine held-out views every so many steps.
+        validation_share: Share of the scenes that is held out; 0 = none.
+        validation_views: Views to refine of the held-out and of the watched scenes.
+        loaders: Threads that read and cut crops.
+        device: Where to train; torchrun makes it several processes.
+        tensorboard: Log for TensorBoard too, where it is installed.
+        seed: Seed of weights, crops and order.
+        init: Weights file to start from, with a fresh optimiser; "shipped" = those that
+            come with the package. The network is then the file's. None = random ones.
+    """
+
+    steps: int = 3000
+    batch_size: int = 4
+    crop_px: int = 512
+    learning_rate: float = 1e-3
+    weight_decay: float = 1e-5
+    optimiser: Optimiser = Optimiser.ADAMW
+    schedule: Schedule = Schedule.ONE_CYCLE
+    largest_gradient: float = 1.0
+    relative: bool = True
+    log_weight: float = 0.1
+    confidence_weight: float = 0.05
+    vary_light: bool = True
+    holes_share: float = 0.2
+    checkpoint_steps: int = 100
+    validation_steps: int = 250
+    validation_share: float = 0.05
+    validation_views: int = 12
+    loaders: int = 1
+    device: Device = Device.AUTO
+    tensorboard: bool = True
+    seed: int = 0
+    init: Path | None = None
+
+    def __post_init__(self) -> None:
+        """Check the ranges once, so that no later code has to."""
+        for name in _AT_LEAST_ONE:
+            value = getattr(self, name)
+            self._check(value >= 1, "at least 1", **{name: value})
+        for name in _NOT_NEGATIVE:
+            value = getattr(self, name)
+            self._check(value >= 0, "0 or more", **{name: value})
+        self._check(
+            self.crop_px >= 32 and self.crop_px % 32 == 0,
+            "a multiple of 32",
+            crop_px=self.crop_px,
+        )
+        self._check(
+            self.learning_rate > 0, "more than 0", learning_rate=self.learning_rate
+        )
+        self._check(0 <= self.holes_share <= 1, "0 to 1", holes_share=self.holes_share)
+        self._check(
+            0 <= self.validation_share <= 0.5,
+            "0 to 0.5",
+            validation_share=self.validation_share,
+        )
+
+    @classmethod
+    def of(cls, preset: Preset, options: dict[str, Any] | None = None) -> Self:
+        """A preset with some options changed.
+
+        `paper` is the paper's training on ETH3D (section "Network Training"): plain L1
+        on inverse depth that the baseline scales, Adam at a constant rate, batches of
+        four crops, horizontal flips and no other augmentation.
+
+        Args:
+            preset: Which one.
+            options: Attributes that differ from it.
+
+        Raises:
+            ConfigError: For an unknown attribute or a value out of range.
+        """
+        chosen = _PAPER if preset is Preset.PAPER else {}
+        return cls.from_mapping({**chosen, **(options or {})})
+
+
+_AT_LEAST_ONE = (
+    "steps",
+    "batch_size",
+    "checkpoint_steps",
+    "validation_steps",
+    "validation_views",
+    "loaders",
+)
+_NOT_NEGATIVE = (
+    "weight_decay",
+    "largest_gradient",
+    "log_weight",
+    "confidence_weight",
+)
+_PAPER: dict[str, Any] = {
+    "learning_rate": 1e-5,
+    "batch_size": 4,
+    "crop_px": 512,
+    "weight_decay": 1e-5,
+    "optimiser": Optimiser.ADAM,
+    "schedule": Schedule.CONSTANT,
+    "largest_gradient": 0.0,
+    "relative": False,
+    "log_weight": 0.0,
+    "confidence_weight": 0.0,
+    "vary_light": False,
+}
