@@ -69,9 +69,11 @@ def train(
     from resdepth_colmap.cli.log import BarProgress
     from resdepth_colmap.training.beginning import chosen_network
     from resdepth_colmap.training.loop import train as run_training
+    from resdepth_colmap.training.ranks import is_first_process
 
     network_config = chosen_network(config, given, preset)
     path = run_training(
         workspaces, output, network_config, config, BarProgress(), validate_on
     )
-    click.echo(path)
+    if is_first_process():
+        click.echo(path)

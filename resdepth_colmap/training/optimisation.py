@@ -48,8 +48,7 @@ class Optimisation:
         model: nn.Module = network
         if ranks.count > 1:
             sync_norms(network)
-            # The norms see the same numbers everywhere: their buffers need no copy.
-            model = DistributedDataParallel(network, broadcast_buffers=False)
+            model = DistributedDataParallel(network)
         else:
             network = network.to(memory_format=torch.channels_last)  # type: ignore[call-overload] # torch's stubs lack the keyword
         kinds = {Optimiser.ADAM: torch.optim.Adam, Optimiser.ADAMW: torch.optim.AdamW}

@@ -70,6 +70,11 @@ class Ranks:
             )
 
 
+def is_first_process() -> bool:
+    """Whether this process is alone or the first one of torchrun's."""
+    return os.environ.get("RANK", "0") == "0"
+
+
 @contextlib.contextmanager
 def join_ranks(device: Device) -> Iterator[Ranks]:
     """Join the processes that torchrun started; without torchrun there is but one.

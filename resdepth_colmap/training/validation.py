@@ -45,8 +45,11 @@ class Scores(NamedTuple):
 
     @property
     def score(self) -> float:
-        """What the best weights have least of: outliers and harm in equal parts."""
-        return 0.5 * (self.mae_ratio + self.medae_ratio)
+        """What the best weights have least of: outliers and harm in equal parts.
+
+        A ratio that is not known (there was no error before) is left out.
+        """
+        return _mean([self.mae_ratio, self.medae_ratio])
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -91,7 +94,8 @@ class ValidationSet:
                         truth=truth,
                     )
                 )
-        return Scores(*(_mean(ratios, place) for place in range(3))), pictures
+        means = [_mean([values[place] for values in ratios]) for place in range(3)]
+        return Scores(*means), pictures
 
     def _refined(
         self, network: ResDepthNet
@@ -133,6 +137,7 @@ def _ratio(after: float, before: float) -> float:
     return after / before if before else math.nan
 
 
-def _mean(ratios: Sequence[Sequence[float]], place: int) -> float:
-    there = [values[place] for values in ratios if math.isfinite(values[place])]
+def _mean(values: Sequence[float]) -> float:
+    """The mean of those that are known; NaN if none is."""
+    there = [value for value in values if math.isfinite(value)]
     return sum(there) / len(there) if there else math.nan

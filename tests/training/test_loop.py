@@ -5,10 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from noisy_planes import write_noisy_plane
 from planes import write_plane_workspace
 
 from resdepth_colmap.errors import TrainingError, WorkspaceError
-from resdepth_colmap.io.depth_map import read_depth_map, write_depth_map
+from resdepth_colmap.io.depth_map import read_depth_map
 from resdepth_colmap.network.network_config import NetworkConfig
 from resdepth_colmap.network.weights import load_weights
 from resdepth_colmap.training.crops import CropSampler
@@ -24,18 +25,7 @@ TRAINING = TrainConfig(
 
 @pytest.fixture
 def workspace(tmp_path: Path) -> Path:
-    """The exact plane, with maps that are wrong in a tenth of the pixels."""
-    path = tmp_path / "plane"
-    rng = np.random.default_rng(0)
-    for view in write_plane_workspace(path, kinds=("photometric",)):
-        name = view.view.name
-        noisy = view.depth * np.where(rng.random(view.depth.shape) < 0.1, 1.3, 1.0)
-        write_depth_map(
-            path / "stereo" / "depth_maps" / f"{name}.photometric.bin",
-            noisy.astype(np.float32),
-        )
-        write_depth_map(path / "ground_truth" / f"{name}.bin", view.depth)
-    return path
+    return write_noisy_plane(tmp_path / "plane")
 
 
 def _parameters(path: Path) -> dict[str, torch.Tensor]:
