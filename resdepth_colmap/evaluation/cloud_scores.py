@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import cKDTree
 
 from resdepth_colmap.evaluation.beams import judge
+from resdepth_colmap.evaluation.cloud_alignment import warn_of_misfit
 from resdepth_colmap.evaluation.cloud_config import CloudConfig
 from resdepth_colmap.evaluation.completeness import completeness_levels
 from resdepth_colmap.evaluation.laser_scan import sort_scan
@@ -24,8 +24,7 @@ from resdepth_colmap.pipeline.progress import Progress, SilentProgress
 logger = logging.getLogger(__name__)
 
 _POINTS_AT_ONCE = 1 << 17
-_NUM_SAMPLES = 50_000
-_ABSURD = 0.05  # of the scans' extent
+_FAR_M = 1e15  # its square is a number in float32
 
 Points = npt.NDArray[np.float32]
 
@@ -94,7 +93,7 @@ def cloud_scores(
     world = np.concatenate([_moved(p, T) for p, T in zip(local, poses, strict=True)])
     if len(world) == 0:
         raise ValueError("the scans have no point.")
-    _check_alignment(points, world)
+    warn_of_misfit(points, world)
     completeness = _completeness(points, world, config, progress)
     num_scan_points = len(world)
     del world
@@ -170,28 +169,9 @@ def _f1(accuracy: float, completeness: float) -> float:
 
 
 def _finite(points: Points, name: str) -> Points:
-    is_finite = np.isfinite(points).all(axis=1)
+    is_finite = (np.abs(points) < _FAR_M).all(axis=1)
     if is_finite.all():
         return points
     num_others = len(points) - int(is_finite.sum())
     logger.warning("%s: %d points are not finite and left out.", name, num_others)
     return points[is_finite]
-
-
-def _check_alignment(points: Points, world: Points) -> None:
-    """Warn of a cloud that cannot be in the frame or the units of the scans."""
-    if len(points) == 0:
-        logger.warning("the cloud has no point; all scores are 0.")
-        return
-    tree = cKDTree(world[:: max(1, len(world) // _NUM_SAMPLES)])
-    distances, _ = tree.query(points[:: max(1, len(points) // _NUM_SAMPLES)])
-    median = float(np.median(distances))
-    extent = float(np.linalg.norm(np.ptp(world.astype(np.float64), axis=0)))
-    if median > _ABSURD * extent:
-        logger.warning(
-            "half of the cloud is more than %.3g m from the scans, which extend over "
-            "%.3g m: it is in other units or not aligned; reconstruct with the poses "
-            "of the benchmark (dslr_calibration_undistorted).",
-            median,
-            extent,
-        )

@@ -68,20 +68,24 @@ def sort_scan(points: Floats) -> LaserScan:
 def spherical(points: Floats) -> tuple[Floats, Floats, Floats]:
     """Azimuth (-pi to pi), inclination (0 to pi from the zenith) and radius.
 
-    At the origin the inclination is taken as pi: ETH3D's program happens to look there.
+    At the origin the inclination is NaN.
     """
     x, y, z = points.T
     radius = np.sqrt((x * x + y * y) + z * z)
     is_origin = radius == 0
-    cosine = np.where(is_origin, np.float32(-1), z) / np.where(is_origin, 1, radius)
-    cosine = np.clip(cosine.astype(np.float32), -1, 1)
+    cosine = np.where(is_origin, np.float32(np.nan), z)
+    cosine = (cosine / np.where(is_origin, np.float32(1), radius)).clip(-1, 1)
     return np.arctan2(y, x), np.arccos(cosine), radius
 
 
 def rows_of(inclination: Floats) -> Indices:
-    """Row of the cell; beyond the poles that of the pole."""
-    rows: Indices = np.floor(inclination / _ROW_RAD).astype(np.int64)
-    return rows.clip(0, NUM_ROWS - 1)
+    """Row of the cell; beyond the poles that of the pole.
+
+    Of NaN it is the last one: there a number that is none ends in ETH3D's program.
+    """
+    cells = np.nan_to_num(np.floor(inclination / _ROW_RAD), nan=NUM_ROWS)
+    rows: Indices = cells.clip(0, NUM_ROWS - 1).astype(np.int64)
+    return rows
 
 
 def columns_of(azimuth: Floats) -> Indices:
