@@ -2,6 +2,9 @@
 
 NOT_KNOWN = "-"
 
+HARDWARE = "two cores of an AMD EPYC, no GPU"
+"""What the documents' figures were measured on."""
+
 
 def markdown_table(header: str, rows: list[list[str]], num_texts: int = 1) -> str:
     """A table: its first columns are texts, to the left, the others numbers.

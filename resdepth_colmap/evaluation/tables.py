@@ -8,7 +8,9 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from resdepth_colmap.evaluation.cloud_tables import cloud_table
 from resdepth_colmap.evaluation.markdown import (
+    HARDWARE,
     NOT_KNOWN,
     count,
     markdown_table,
@@ -120,6 +122,7 @@ DOCUMENTS: dict[str, dict[str, Renderer]] = {
         "middlebury": middlebury_table,
         "workspaces": workspaces_table,
         "refine": refine_table,
+        "cloud": cloud_table,
     },
 }
 """The documents, and who renders the place of each name from the file of that name."""
