@@ -87,7 +87,8 @@ def write_scene(folder: Path, num_points: int) -> None:
     cloud = scanned(corner, num_points) + corner
     cloud += rng.normal(0, NOISE_M, cloud.shape)
     is_floating = rng.random(len(cloud)) < SHARE_OF_FLOATERS
-    cloud[is_floating] = rng.uniform(*ROOM_M, (int(is_floating.sum()), 3))
+    shape = (int(is_floating.sum()), 3)
+    cloud[is_floating] = rng.uniform(ROOM_M[0], ROOM_M[1], shape)
     write_points(folder / "reconstruction.ply", rng.permutation(cloud))
 
 

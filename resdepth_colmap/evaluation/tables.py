@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from resdepth_colmap.evaluation.cloud_tables import cloud_table
+from resdepth_colmap.evaluation.markdown import HARDWARE as HARDWARE
 from resdepth_colmap.evaluation.markdown import (
-    HARDWARE,
     NOT_KNOWN,
     count,
     markdown_table,
@@ -18,7 +18,6 @@ from resdepth_colmap.evaluation.markdown import (
     percent,
 )
 
-HARDWARE = "two cores of an AMD EPYC, no GPU"
 DEPTHS = {"unfiltered": "unfiltered", "median": "5 x 5 median", "refined": "refined"}
 
 Measured = Mapping[str, Any]
