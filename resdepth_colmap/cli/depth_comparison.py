@@ -66,8 +66,17 @@ def run_evaluation(
     options: "EvaluationOptions",
     table: "Callable[[Measured], str]",
     values: dict[str, Any],
+    protocol: dict[str, Any] | None = None,
 ) -> None:
-    """Measure, print and write the result; exit code 1 if a scene is broken."""
+    """Measure, print and write the result; exit code 1 if a scene is broken.
+
+    Args:
+        sources: The scenes.
+        options: How they are measured.
+        table: Makes tables of the result.
+        values: The command's values: as_json and output.
+        protocol: What else the result has to say of itself.
+    """
     from resdepth_colmap.cli.log import BarProgress
     from resdepth_colmap.evaluation.depth_evaluation import Listener, evaluate_scenes
     from resdepth_colmap.io.files import write_whole
@@ -75,6 +84,8 @@ def run_evaluation(
     listener = Listener(on_failure=_say_failure, progress=BarProgress())
     report = evaluate_scenes(sources, options, listener)
     measured = {"command": command_line(skip=_UNSAID), **report.to_mapping()}
+    if protocol is not None:
+        measured["protocol"] = protocol
     text = json.dumps(measured, indent=2, ensure_ascii=False)
     if values["output"]:
         write_whole(values["output"], f"{text}\n".encode())

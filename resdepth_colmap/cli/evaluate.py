@@ -5,7 +5,7 @@ import click
 from resdepth_colmap.cli.lazy_group import LazyGroup
 from resdepth_colmap.cli.options import example, verbosity_options
 
-EVALUATIONS: tuple[str, ...] = ("cloud", "depth")
+EVALUATIONS: tuple[str, ...] = ("cloud", "depth", "eth3d")
 """Names of the sub-commands; that of "cloud" is `cloud` in evaluate_cloud.py."""
 
 

@@ -2,6 +2,7 @@
 
 import dataclasses
 import datetime
+import logging
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -22,6 +23,8 @@ from resdepth_colmap.pipeline.refine import SourceView, ViewInputs, refine_view
 from resdepth_colmap.pipeline.versions import versions
 
 _WARM_UP_PX = 32
+
+logger = logging.getLogger(__name__)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -119,6 +122,7 @@ def _measure_scene(
     wanted = CaseOptions(stereo=options.stereo, num_sources=num_sources)
 
     def measured(case: DepthCase) -> CaseResult:
+        logger.debug("%s: %s", source.name, case.name)
         initial = initial_depth(
             source.name, case, backend, options.stereo, options.cache
         )

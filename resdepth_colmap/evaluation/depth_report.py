@@ -51,6 +51,7 @@ class SceneResult:
         mapping: dict[str, Any] = {
             "initial": sorted({case.origin for case in self.cases}),
             "num_views": len(self.cases),
+            "view_names": [case.name for case in self.cases],
             **plain_errors(self.errors),
         }
         if all(case.seen is not None for case in self.cases):

@@ -23,11 +23,9 @@ def depth_table(measured: Measured) -> str:
     """
     if not measured["scenes"]:
         return "No scene could be compared."
-    limit = measured["options"]["max_residual"]
-    discarded = "none is discarded" if limit is None else f"beyond {limit:g} discarded"
     return "\n\n".join(
         [
-            f"Errors in workspace units, residuals {discarded}; "
+            f"Errors in workspace units, {residuals_said(measured)}; "
             f"weights `{measured['weights_sha256'][:12]}`.",
             markdown_table(
                 "scene | depth | MAE | RMSE | MedAE | off by > 1 % | off by > 2 % | "
@@ -61,6 +59,14 @@ def parts_table(measured: Measured) -> str:
         for arm, label in DEPTHS.items()
     ]
     return markdown_table(header, rows, num_texts=2)
+
+
+def residuals_said(measured: Measured, unit: str = "units") -> str:
+    """Which residuals were discarded, before means and medians were taken."""
+    limit = measured["options"]["max_residual"]
+    if limit is None:
+        return "no residual discarded"
+    return f"residuals beyond {limit:g} {unit} discarded"
 
 
 def origins(measured: Measured) -> str:

@@ -23,6 +23,7 @@ from resdepth_colmap.scene import DepthMap, Scene, View
 
 TRUTH_FOLDER = "ground_truth"
 SEEN_SUFFIX = ".nonoccluded.png"
+IMAGE_CACHE_BYTES = 256 << 20  # of images that several views are compared with
 _SEEN = 1  # 255 in the file; occluded pixels are grey
 _WAY_OUT = "data/README.md says what a workspace with truth holds"
 
@@ -45,7 +46,7 @@ def read_workspace_cases(path: Path, options: CaseOptions) -> Iterator[DepthCase
     scene = read_scene(workspace.sparse_path, workspace.images_path, workspace.path)
     names = _names_with_truth(workspace, scene)
     check_images(workspace, scene)
-    images = ViewImages(workspace, 2 * (1 + options.stereo.max_num_sources))
+    images = ViewImages(workspace, IMAGE_CACHE_BYTES)
     for name in names:
         yield _case(workspace, scene, scene.index(name), images, options)
 

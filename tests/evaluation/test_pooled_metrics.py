@@ -24,7 +24,8 @@ def maps(seed: int, scale: float) -> tuple[DepthMap, DepthMap]:
 @given(seed=st.integers(0, 1000), scale=st.sampled_from([1e-4, 0.02, 6.0]))
 def test_pooling_is_measuring_all_pixels_at_once(seed: int, scale: float) -> None:
     pairs = [maps(seed + i, scale * (1 + i)) for i in range(3)]
-    whole = depth_metrics(*(np.concatenate(part) for part in zip(*pairs, strict=True)))
+    depth, truth = (np.concatenate(part) for part in zip(*pairs, strict=True))
+    whole = depth_metrics(depth, truth)
     together = pooled([ErrorSample.of(*pair) for pair in pairs]).metrics.to_mapping()
     for name, value in whole.to_mapping().items():
         # The median is read off a histogram whose bins are half a per cent wide.

@@ -1,0 +1,133 @@
+"""Which stereo pairs of an ETH3D scene are compared.
+
+The paper picked its pairs by hand, "with high overlap and reasonable baselines", and
+did not publish them; here a rule does it, and a file `pairs.txt` may say otherwise.
+"""
+
+from collections.abc import Collection, Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from resdepth_colmap.errors import WorkspaceError
+from resdepth_colmap.geometry.overlap import overlap
+from resdepth_colmap.geometry.view_selection import (
+    GOOD_ANGLES_DEG,
+    SourceChoice,
+    choose_sources,
+)
+from resdepth_colmap.scene import Scene
+
+PAIRS_NAME = "pairs.txt"
+NUM_PAIRS = 4
+"""Pairs of a scene of which the paper does not say how many it has."""
+
+LEAST_OVERLAP = 0.6
+"""Share of the reference that the source sees, at the middle of its depths."""
+
+
+class Pair(NamedTuple):
+    """A stereo pair.
+
+    Attributes:
+        reference: Position in `Scene.views` of the view whose depth is compared.
+        source: Position of the second view.
+    """
+
+    reference: int
+    source: int
+
+
+def choose_pairs(
+    scene: Scene, references: Collection[int], num_pairs: int
+) -> tuple[Pair, ...]:
+    """The pairs with the most shared points, at a reasonable angle, no view twice.
+
+    Each reference is paired with its best source (`choose_sources`). A pair counts if
+    the source sees 60 % of the reference and the rays meet at 2 to 15 degrees. Those
+    with the most shared points are taken; where no view is left that is in no pair
+    yet, a view may be in two.
+
+    Args:
+        scene: The views and their statistics.
+        references: Positions of the views whose depth is known.
+        num_pairs: How many to take at most.
+
+    Returns:
+        The pairs, by their references; fewer than asked for if fewer count.
+    """
+    found = []
+    for reference in sorted(references):
+        for choice in choose_sources(scene, reference, 1):
+            if _is_good(scene, reference, choice):
+                found.append((choice.num_shared_points, reference, choice.index))
+    ranked = [Pair(r, s) for _, r, s in sorted(found, key=lambda it: (-it[0], it[1]))]
+    taken: list[Pair] = []
+    for pair in ranked:
+        if not any(set(pair) & set(other) for other in taken):
+            taken.append(pair)
+    taken += [pair for pair in ranked if pair not in taken]
+    return tuple(sorted(taken[:num_pairs]))
+
+
+def read_pairs(path: Path) -> dict[str, list[tuple[str, str]]]:
+    """Read a `pairs.txt`: scene, reference and source on a line, "#" for comments.
+
+    Returns:
+        File names of reference and source, by the name of the scene.
+
+    Raises:
+        WorkspaceError: If it cannot be read, or a line has not three words.
+    """
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise WorkspaceError(f"{path}: cannot be read as text in UTF-8.") from error
+    pairs: dict[str, list[tuple[str, str]]] = {}
+    for line_number, line in enumerate(lines, 1):
+        words = line.partition("#")[0].split()
+        if not words:
+            continue
+        if len(words) != 3:
+            raise WorkspaceError(
+                f"{path}, line {line_number}: {line.strip()!r}, but expected the name "
+                "of a scene, its reference and its source image, as in "
+                "'office DSC_0220.JPG DSC_0221.JPG'."
+            )
+        pairs.setdefault(words[0], []).append((words[1], words[2]))
+    return pairs
+
+
+def named_pairs(
+    path: Path, names: list[tuple[str, str]], indices: Mapping[str, int]
+) -> tuple[Pair, ...]:
+    """The pairs that a `pairs.txt` names.
+
+    Args:
+        path: That file, for messages.
+        names: File names of reference and source.
+        indices: Position of each view by the file name of its image.
+
+    Raises:
+        WorkspaceError: If the model has no image of a name, or a pair is one image.
+    """
+    for pair in names:
+        for name in pair:
+            if name not in indices:
+                raise WorkspaceError(
+                    f"{path}: names {name}, but the model has no such image."
+                )
+        if pair[0] == pair[1]:
+            raise WorkspaceError(f"{path}: pairs {pair[0]} with itself.")
+    return tuple(Pair(indices[first], indices[second]) for first, second in names)
+
+
+def _is_good(scene: Scene, reference: int, choice: SourceChoice) -> bool:
+    if scene.depth_range is None or scene.depth_range[reference, 1] <= 0:
+        return True  # choose_sources went by the poses alone, and so do we
+    low, high = GOOD_ANGLES_DEG
+    middle = float(np.sqrt(np.prod(scene.depth_range[reference])))
+    seen = overlap(scene.views[reference], scene.views[choice.index], [middle])
+    is_seen = float(seen.inside.mean()) >= LEAST_OVERLAP
+    return is_seen and low <= choice.angle_deg <= high

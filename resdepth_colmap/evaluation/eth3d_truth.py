@@ -1,0 +1,87 @@
+"""ETH3D's true depth, brought to the undistorted camera.
+
+The depth is given for the pixels of the distorted image. Each is lifted by the
+distorted camera and falls into a pixel of the undistorted one; a bilinear remapping
+would mix surfaces with each other, and with "not known".
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+import numpy.typing as npt
+
+from resdepth_colmap.errors import WorkspaceError
+from resdepth_colmap.geometry.pixels import index_K
+from resdepth_colmap.geometry.projection import transform
+from resdepth_colmap.geometry.splat import splat_depth
+from resdepth_colmap.io.distorted_camera import DistortedView
+from resdepth_colmap.io.eth3d import Eth3dScene, read_evaluated, read_raw_depth
+from resdepth_colmap.scene import Camera, DepthMap, Matrix, View
+
+_PIXELS_AT_ONCE = 1 << 21
+_LARGEST_ANGLE_DEG = 0.5
+_LARGEST_SHIFT = 0.01  # metres: both models are of one camera, so there is none
+
+
+def undistorted_truth(
+    scene: Eth3dScene, distorted: DistortedView, view: View, camera: Camera
+) -> DepthMap:
+    """The true depth of an undistorted image.
+
+    Args:
+        scene: Where the files lie.
+        distorted: The image as it was taken.
+        view: The undistorted image.
+        camera: Its camera at the size of the map.
+
+    Returns:
+        Shape (H, W), float32, in metres; 0 = not known, or not to be compared.
+
+    Raises:
+        WorkspaceError: If a file is missing, broken or of another size, or the two
+            calibrations are not of one image.
+    """
+    _check_poses(scene, distorted, view)
+    file_name = distorted.name.rpartition("/")[2]
+    width_px, height_px = distorted.size_px
+    depth = read_raw_depth(scene.truth_path(file_name), width_px, height_px)
+    for path in scene.mask_paths(file_name):
+        if path.is_file():
+            depth *= read_evaluated(path, width_px, height_px)
+    chunks = _points(depth, distorted, _view_from(distorted, view))
+    return splat_depth(chunks, index_K(camera), camera.height_px, camera.width_px)
+
+
+def _points(
+    depth: DepthMap, distorted: DistortedView, view_from_distorted: Matrix
+) -> Iterator[Matrix]:
+    """The known points in the undistorted camera's frame, some at a time."""
+    pixels: npt.NDArray[np.int64] = np.flatnonzero(depth)
+    for start in range(0, pixels.size, _PIXELS_AT_ONCE):
+        chosen = pixels[start : start + _PIXELS_AT_ONCE]
+        rows, columns = np.divmod(chosen, depth.shape[1])
+        rays = distorted.rays(np.stack([columns, rows], axis=1))
+        xyz = rays * depth.ravel()[chosen, np.newaxis]
+        yield transform(view_from_distorted, xyz)
+
+
+def _view_from(distorted: DistortedView, view: View) -> Matrix:
+    """The pose view_from_distorted, shape (3, 4)."""
+    pose = distorted.cam_from_world
+    rotation = view.cam_from_world[:, :3] @ pose[:, :3].T
+    return np.column_stack(
+        [rotation, view.cam_from_world[:, 3] - rotation @ pose[:, 3]]
+    )
+
+
+def _check_poses(scene: Eth3dScene, distorted: DistortedView, view: View) -> None:
+    pose = _view_from(distorted, view)
+    cosine = np.clip((np.trace(pose[:, :3]) - 1) / 2, -1, 1)
+    angle_deg = float(np.degrees(np.arccos(cosine)))
+    shift = float(np.linalg.norm(pose[:, 3]))
+    if angle_deg > _LARGEST_ANGLE_DEG or shift > _LARGEST_SHIFT:
+        raise WorkspaceError(
+            f"{scene.path}: {scene.undistorted_model_path.name} and "
+            f"{scene.distorted_model_path.name} place {view.name} at different poses "
+            f"({angle_deg:.1f} deg, {shift:.3f} m apart); unpack both anew."
+        )
