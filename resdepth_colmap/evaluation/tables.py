@@ -17,6 +17,7 @@ from resdepth_colmap.evaluation.markdown import (
     number,
     percent,
 )
+from resdepth_colmap.evaluation.variant_tables import variants_table
 
 DEPTHS = {"unfiltered": "unfiltered", "median": "5 x 5 median", "refined": "refined"}
 
@@ -121,6 +122,7 @@ DOCUMENTS: dict[str, dict[str, Renderer]] = {
         "middlebury": middlebury_table,
         "workspaces": workspaces_table,
         "refine": refine_table,
+        "variants": variants_table,
         "cloud": cloud_table,
     },
 }

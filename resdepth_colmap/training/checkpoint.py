@@ -26,6 +26,7 @@ FREE_TO_CHANGE = (
     "loaders",
     "device",
     "tensorboard",
+    "samples",
 )
 """Options that do not change which steps are taken."""
 

@@ -71,7 +71,7 @@ def prepare_data(
     scenes, watched = find_scenes(places.workspaces), find_scenes(places.validate_on)
     check_apart(scenes, watched)
     split = split_scenes(scenes, config.validation_share)
-    cache = places.output / CACHE_FOLDER
+    cache = config.samples or places.output / CACHE_FOLDER
 
     def make() -> tuple[tuple[Path, ...], ...]:
         return tuple(

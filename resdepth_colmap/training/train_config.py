@@ -57,6 +57,8 @@ class TrainConfig(Config):
         seed: Seed of weights, crops and order.
         init: Weights file to start from, with a fresh optimiser; "shipped" = those that
             come with the package. The network is then the file's. None = random ones.
+        samples: Folder of prepared samples, which several trainings may share; None =
+            one in the output folder.
     """
 
     steps: int = 3000
@@ -81,6 +83,7 @@ class TrainConfig(Config):
     tensorboard: bool = True
     seed: int = 0
     init: Path | None = None
+    samples: Path | None = None
 
     def __post_init__(self) -> None:
         """Check the ranges once, so that no later code has to."""
