@@ -62,6 +62,24 @@ def read_scene(sparse_path: Path, images_path: Path, workspace_path: Path) -> Sc
             raise _broken(sparse_path, error) from error
 
 
+def read_image_indices(sparse_path: Path) -> dict[int, int]:
+    """The place of each image, by its id, among those of COLMAP's MVSModel.
+
+    COLMAP takes the images with a pose as the model has them, which need not be by
+    ascending ids. Its consistency graphs count like that.
+
+    Raises:
+        WorkspaceError: If the model is missing or broken.
+    """
+    check_model_files(sparse_path)
+    with _quiet_pycolmap():
+        try:
+            image_ids = pycolmap.Reconstruction(sparse_path).reg_image_ids()
+        except _PYCOLMAP_ERRORS as error:
+            raise _broken(sparse_path, error) from error
+    return {int(image_id): index for index, image_id in enumerate(image_ids)}
+
+
 def _views(sparse_path: Path, images_path: Path, model: Any) -> tuple[View, ...]:
     """The images that have a pose, image ids ascending."""
     images = [model.images[image_id] for image_id in sorted(model.reg_image_ids())]

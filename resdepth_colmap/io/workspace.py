@@ -48,6 +48,11 @@ class Workspace:
         """The normal map of an image; it may not exist. `kind` as in `map_kinds`."""
         return self.stereo_path / "normal_maps" / f"{safe_name(name)}.{kind}.bin"
 
+    def consistency_graph_path(self, name: str, kind: str) -> Path:
+        """The consistency graph of an image; it may not exist."""
+        folder = self.stereo_path / "consistency_graphs"
+        return folder / f"{safe_name(name)}.{kind}.bin"
+
     def truth_path(self, name: str) -> Path:
         """The true depth map of an image, where one is known; it may not exist."""
         return self.path / "ground_truth" / f"{safe_name(name)}.bin"
