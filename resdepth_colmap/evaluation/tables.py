@@ -114,6 +114,24 @@ def refine_table(measured: Measured) -> str:
     return "\n\n".join([_measured_by(measured), markdown_table(header, rows)])
 
 
+def stereo_memory_table(measured: Measured) -> str:
+    """Memory of the matcher by the number of views, and how soon it starts."""
+    start, width_px, height_px = measured["start"], *measured["options"]["size_px"]
+    rows = [
+        [str(run["views"]), f"{run['peak_memory_mb'] / 1024:.2f}"]
+        for run in measured["memory"]
+    ]
+    header = f"views of {width_px} x {height_px} px | peak memory, GiB"
+    return "\n\n".join(
+        [
+            f"Measured by `{measured['command']}` on {measured['date']}, {HARDWARE}.",
+            markdown_table(header, rows),
+            f"From the call of the program to the first progress: {start['cold_s']:.0f}"
+            f" s with nothing compiled, {start['warm_s']:.1f} s later.",
+        ]
+    )
+
+
 Renderer = Callable[[Measured], str]
 
 DOCUMENTS: dict[str, dict[str, Renderer]] = {
@@ -124,6 +142,7 @@ DOCUMENTS: dict[str, dict[str, Renderer]] = {
         "refine": refine_table,
         "variants": variants_table,
         "cloud": cloud_table,
+        "stereo_memory": stereo_memory_table,
     },
 }
 """The documents, and who renders the place of each name from the file of that name."""
