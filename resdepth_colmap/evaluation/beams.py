@@ -68,8 +68,6 @@ class _Beam:
         height = _angle(self.radius, distance)
         x, y, _ = points.T
         width = _angle(self.radius, np.sqrt(x * x + y * y))
-        # At the scanner every direction may meet the point.
-        width[self.radius >= distance] = _HALF_TURN
         self.first_row = rows_of(inclination - height)
         self.num_rows: Indices = rows_of(inclination + height) - self.first_row + 1
         first, last = columns_of(azimuth - width), columns_of(azimuth + width)

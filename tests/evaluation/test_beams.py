@@ -106,9 +106,10 @@ def test_a_point_of_the_scan_in_the_scanner_does_no_harm() -> None:
     assert in_front[0]
 
 
-def test_the_opposite_side_is_unobserved() -> None:
+@pytest.mark.parametrize("x_m", [-1, -0.0005])  # the second within the beam's width
+def test_the_opposite_side_is_unobserved(x_m: float) -> None:
     scan = sort_scan(np.array([[2, 0, 0]], np.float32))
-    squared, in_front = judge(np.array([[-1, 0, 0]], np.float32), scan, CONFIG)
+    squared, in_front = judge(np.array([[x_m, 0, 0]], np.float32), scan, CONFIG)
     assert np.isinf(squared[0])
     assert not in_front[0]
 

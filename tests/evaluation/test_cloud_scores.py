@@ -118,6 +118,17 @@ def test_accurate_in_one_scan_wins_over_inaccurate_in_another() -> None:
     assert score(board, with_board, first).accuracy == ALL_RIGHT
 
 
+def test_free_space_of_one_scan_is_not_mended_by_a_scan_that_saw_nothing() -> None:
+    scan = room_scan()
+    sees_little = PlacedScan(
+        points=scan.points[:10], world_from_scan=scan.world_from_scan
+    )
+    cloud = np.concatenate([in_world(scan), towards(scan, 0.5)])
+    scores = [score(cloud, scan, sees_little), score(cloud, sees_little, scan)]
+    assert scores[0].accuracy == scores[1].accuracy == score(cloud, scan).accuracy
+    assert scores[0].accuracy[0] < 0.6
+
+
 def test_a_common_motion_changes_scores_by_the_grids_alone() -> None:
     scan = room_scan()
     cloud = noisy(scan)

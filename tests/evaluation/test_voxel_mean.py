@@ -23,9 +23,9 @@ def test_the_second_grid_joins_what_the_first_one_parts() -> None:
 
 
 def test_voxels_about_0_are_as_large_as_others() -> None:
-    points = grids([[-0.004, 0, 0], [0.004, 0, 0]])
-    share = points.mean_share(np.array([True, False]), np.ones(2, bool))
-    assert share == pytest.approx((1 + 0 + 1 / 2) / 3)
+    points = grids([[-0.004, 0, 0], [0.004, 0, 0], [0.003, 0, 0]])
+    share = points.mean_share(np.array([True, False, False]), np.ones(3, bool))
+    assert share == pytest.approx((1 + 0 + 1 / 3) / 3)
 
 
 def test_a_voxel_without_a_counted_point_is_left_out() -> None:
