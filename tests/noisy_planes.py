@@ -14,6 +14,7 @@ def write_noisy_plane(
     kinds: tuple[str, ...] = ("photometric",),
     unknown_share: float = 0.0,
     wrong_share: float = 0.1,
+    size_px: tuple[int, int] = (80, 60),
     seed: int = 0,
 ) -> Path:
     """Write the workspace of the plane, with its truth and with mistaken maps.
@@ -23,13 +24,14 @@ def write_noisy_plane(
         kinds: The kinds of maps; "geometric" ones are exact and have holes instead.
         unknown_share: Share of pixels whose truth is not known, in 0..1.
         wrong_share: Share of pixels whose depth is 1.3 times the true one, in 0..1.
+        size_px: Width and height of the images.
         seed: Of the mistakes.
 
     Returns:
         The folder.
     """
     rng = np.random.default_rng(seed)
-    for view in write_plane_workspace(path, kinds=kinds):
+    for view in write_plane_workspace(path, kinds=kinds, size_px=size_px):
         name, depth = view.view.name, view.depth
         is_wrong = rng.random(depth.shape) < wrong_share
         maps = {

@@ -1,0 +1,127 @@
+"""Laws of the crops: what is cut, mirrored and dealt out."""
+
+import dataclasses
+from pathlib import Path
+from unittest import mock
+
+import numpy as np
+import pytest
+import torch
+from noisy_planes import write_noisy_plane
+
+from resdepth_colmap.errors import TrainingError
+from resdepth_colmap.network.network_config import InputVariant, NetworkConfig
+from resdepth_colmap.pipeline.inputs import photo_consistency
+from resdepth_colmap.training import crops
+from resdepth_colmap.training.crops import CropSampler
+from resdepth_colmap.training.samples import prepare_samples, read_sample
+
+NETWORK = NetworkConfig(levels=3, base_channels=4, max_channels=8)
+
+
+@pytest.fixture(scope="module")
+def samples(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, ...]:
+    folder = tmp_path_factory.mktemp("crops")
+    scene = write_noisy_plane(folder / "plane")
+    return tuple(prepare_samples([scene], NETWORK, folder / "cache"))
+
+
+def sampler_of(samples: tuple[Path, ...], **changes: object) -> CropSampler:
+    sampler = CropSampler(
+        paths=samples,
+        config=NETWORK,
+        batch_size=4,
+        crop_px=40,
+        seed=1,
+        vary_light=False,
+    )
+    return dataclasses.replace(sampler, **changes)  # type: ignore[arg-type]
+
+
+def test_the_processes_share_the_batch_of_one(samples: tuple[Path, ...]) -> None:
+    sampler = sampler_of(samples, vary_light=True)
+    whole = sampler.batch(3)
+    parts = [sampler.batch(3, rank, 2) for rank in range(2)]
+    for rank, part in enumerate(parts):
+        assert torch.equal(part.inputs, whole.inputs[rank::2])
+        assert torch.equal(part.target, whole.target[rank::2])
+        assert part.names == whole.names
+
+
+def test_a_mirrored_crop_is_that_of_a_mirrored_pair(samples: tuple[Path, ...]) -> None:
+    """The warped source still matches: its correlation is that which was stored."""
+    batch = sampler_of(samples, batch_size=16).batch(0)
+    names = NETWORK.channels
+    reference, source, stored = (
+        batch.inputs[:, [names.index(name)]]
+        for name in ("reference", "source_0", "photo_consistency")
+    )
+    inside = source > 0  # outside it is exactly black
+    again = photo_consistency(reference, [(source, inside)])
+    middle = (..., slice(4, -4), slice(4, -4))  # windows that the crop does not cut
+    error = (again - stored)[middle].abs()
+    assert float(error.quantile(0.95)) < 0.02
+    mirrored = photo_consistency(reference, [(source.flip(-1), inside.flip(-1))])
+    assert float((mirrored - stored)[middle].abs().mean()) > 0.1
+
+
+def test_half_of_the_crops_are_mirrored(samples: tuple[Path, ...]) -> None:
+    one = (samples[0],)
+    original = read_sample(samples[0]).target
+    sampler = sampler_of(one, batch_size=60, crop_px=40)
+    num_mirrored = 0
+    for item in range(60):
+        _, rng = sampler._draw(0, item)
+        crop = sampler._crop(samples[0], np.array(original.shape), rng).target
+        gradient = np.diff(crop.astype(np.float64), axis=1).mean()
+        expected = np.diff(original.astype(np.float64), axis=1).mean()
+        num_mirrored += bool(gradient * expected < 0)
+    assert 15 < num_mirrored < 45
+
+
+def test_images_of_different_sizes_share_a_batch(tmp_path: Path) -> None:
+    paths = []
+    for name, size_px in {"a": (80, 60), "b": (56, 96)}.items():
+        scene = write_noisy_plane(tmp_path / name, size_px=size_px)
+        paths += prepare_samples([scene], NETWORK, tmp_path / "cache")
+    sampler = sampler_of(tuple(paths), batch_size=8, crop_px=512)
+    assert sampler.batch(0).inputs.shape == (8, 5, 56, 56)
+
+
+def test_too_small_an_image_is_named(samples: tuple[Path, ...]) -> None:
+    config = NetworkConfig(levels=7)
+    with pytest.raises(TrainingError, match=r"plane-.*a side of 60 px.*7 levels"):
+        sampler_of(samples, config=config).batch(0)
+
+
+@pytest.mark.parametrize("variant", InputVariant)
+def test_a_variant_sees_its_channels(
+    samples: tuple[Path, ...], variant: InputVariant
+) -> None:
+    config = dataclasses.replace(NetworkConfig.paper(variant), levels=3)
+    batch = sampler_of(samples, config=config, relative=False).batch(0)
+    assert batch.inputs.shape[1] == len(config.channels)
+    assert (batch.weight == 1).all()
+    if config.residual:
+        error = (batch.inputs[:, :1] - batch.target).abs()[batch.known]
+        assert float(error.median()) < 1e-4
+
+
+def test_the_share_of_maps_with_holes_is_as_asked(samples: tuple[Path, ...]) -> None:
+    for share in (0.0, 1.0):
+        names = sampler_of(samples, holes_share=share, batch_size=12).batch(0).names
+        assert all(name.endswith("-holes") == bool(share) for name in names)
+    holes = tuple(path for path in samples if path.stem.endswith("-holes"))
+    assert sampler_of(holes, holes_share=0.0).batch(0).names
+
+
+def test_light_changes_photographs_alone(samples: tuple[Path, ...]) -> None:
+    plain = sampler_of(samples).batch(0)
+    with mock.patch.object(crops.CropSampler, "_other_light", lambda _, g, __: g * 0):
+        dark = sampler_of(samples, vary_light=True).batch(0)
+    assert (dark.inputs[:, 1:] == 0).all()
+    varied = sampler_of(samples, vary_light=True).batch(0)
+    for index, name in enumerate(NETWORK.channels):
+        is_photo = name in ("reference", "source_0")
+        same = torch.equal(varied.inputs[:, index], plain.inputs[:, index])
+        assert same != is_photo
