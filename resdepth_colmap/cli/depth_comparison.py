@@ -17,6 +17,17 @@ if TYPE_CHECKING:
     from resdepth_colmap.evaluation.depth_evaluation import EvaluationOptions
     from resdepth_colmap.evaluation.tables import Measured
 
+MATCHER_OPTIONS = (
+    "window_radius",
+    "window_step",
+    "sigma_color",
+    "num_iterations",
+    "depth_min",
+    "depth_max",
+    "seed",
+)
+"""Those of StereoConfig that an unfiltered map of one pass depends on."""
+
 max_residual_option = click.option(
     "--max-residual",
     type=click.FloatRange(min=0),

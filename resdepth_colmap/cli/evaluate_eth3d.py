@@ -6,6 +6,7 @@ from typing import Any
 import click
 
 from resdepth_colmap.cli.depth_comparison import (
+    MATCHER_OPTIONS,
     evaluation_options,
     max_residual_option,
     report_options,
@@ -55,7 +56,7 @@ CACHE_NAME = "resdepth-cache"
     text="Whose PatchMatch: COLMAP's (needs CUDA), or ours on the CPU.",
 )
 @config_options(RefineConfig, "passes", "keep_confirmed", "weights", "device")
-@config_options(StereoConfig, skip=("max_image_size", "max_num_sources"))
+@config_options(StereoConfig, *MATCHER_OPTIONS)
 @max_residual_option
 @click.option(
     "--cache",
