@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.geometry.pixels import index_K
+from resdepth_colmap.geometry.pixels import CENTER_PX, index_K
 from resdepth_colmap.geometry.projection import transform
 from resdepth_colmap.geometry.splat import splat_depth
 from resdepth_colmap.io.distorted_camera import DistortedView
@@ -60,7 +60,8 @@ def _points(
     for start in range(0, pixels.size, _PIXELS_AT_ONCE):
         chosen = pixels[start : start + _PIXELS_AT_ONCE]
         rows, columns = np.divmod(chosen, depth.shape[1])
-        rays = distorted.rays(np.stack([columns, rows], axis=1))
+        centers = np.stack([columns, rows], axis=1) + CENTER_PX  # index to COLMAP
+        rays = distorted.rays(centers)
         xyz = rays * depth.ravel()[chosen, np.newaxis]
         yield transform(view_from_distorted, xyz)
 

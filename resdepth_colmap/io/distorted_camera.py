@@ -11,8 +11,6 @@ from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.io.reconstruction import open_reconstruction
 from resdepth_colmap.scene import Matrix
 
-_CENTER_PX = 0.5  # COLMAP's cameras count a pixel's centre as index + 0.5
-
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class DistortedView:
@@ -33,16 +31,15 @@ class DistortedView:
         """Width and height."""
         return int(self.camera.width), int(self.camera.height)
 
-    def rays(self, xy_index: Matrix) -> Matrix:
-        """Rays through pixels, in the camera frame, with z = 1.
+    def rays(self, xy: Matrix) -> Matrix:
+        """Rays through places of the image, in the camera frame, with z = 1.
 
         Args:
-            xy_index: Pixels in index coordinates, shape (N, 2).
+            xy: COLMAP's coordinates, in pixels, shape (N, 2), float64.
 
         Returns:
             Shape (N, 3), float64; NaN where the distortion cannot be undone.
         """
-        xy = np.asarray(xy_index, dtype=np.float64) + _CENTER_PX  # index to COLMAP
         on_plane = self.camera.cam_from_img(xy)
         return np.column_stack([on_plane, np.ones(len(on_plane))])
 
