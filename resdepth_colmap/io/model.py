@@ -1,9 +1,7 @@
 """COLMAP's sparse model, read into a Scene."""
 
-import contextlib
 import shlex
 from collections import Counter
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,14 +11,17 @@ import pycolmap
 
 from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.io.files import safe_name
-from resdepth_colmap.io.model_file import check_model_files, find_model, names_in_text
+from resdepth_colmap.io.model_file import find_model, names_in_text
+from resdepth_colmap.io.reconstruction import (
+    PYCOLMAP_ERRORS,
+    broken_model,
+    open_reconstruction,
+    quiet_pycolmap,
+)
 from resdepth_colmap.scene import Camera, Matrix, Scene, View
 
 _PINHOLES = ("PINHOLE", "SIMPLE_PINHOLE")
 _ANGLE_PERCENTILE = 75.0  # COLMAP's choice for the sources of its PatchMatch
-
-# What pycolmap raises for a broken model (UnicodeDecodeError is a ValueError).
-_PYCOLMAP_ERRORS = (ValueError, IndexError, KeyError, RuntimeError, OSError)
 
 
 def read_scene(sparse_path: Path, images_path: Path, workspace_path: Path) -> Scene:
@@ -40,10 +41,9 @@ def read_scene(sparse_path: Path, images_path: Path, workspace_path: Path) -> Sc
         WorkspaceError: If the model is missing, broken or empty, has a camera with
             distortion, or names an image outside of its folder.
     """
-    check_model_files(sparse_path)
-    with _quiet_pycolmap():
+    model = open_reconstruction(sparse_path)
+    with quiet_pycolmap():
         try:
-            model = pycolmap.Reconstruction(sparse_path)
             views = _views(sparse_path, images_path, model)
             num_points = model.num_points3D()
             if num_points == 0:
@@ -58,8 +58,8 @@ def read_scene(sparse_path: Path, images_path: Path, workspace_path: Path) -> Sc
             return _scene_with_points(views, num_points, mvs_model, order)
         except WorkspaceError:
             raise
-        except _PYCOLMAP_ERRORS as error:
-            raise _broken(sparse_path, error) from error
+        except PYCOLMAP_ERRORS as error:
+            raise broken_model(sparse_path, error) from error
 
 
 def read_image_indices(sparse_path: Path) -> dict[int, int]:
@@ -71,12 +71,7 @@ def read_image_indices(sparse_path: Path) -> dict[int, int]:
     Raises:
         WorkspaceError: If the model is missing or broken.
     """
-    check_model_files(sparse_path)
-    with _quiet_pycolmap():
-        try:
-            image_ids = pycolmap.Reconstruction(sparse_path).reg_image_ids()
-        except _PYCOLMAP_ERRORS as error:
-            raise _broken(sparse_path, error) from error
+    image_ids = open_reconstruction(sparse_path).reg_image_ids()
     return {int(image_id): index for index, image_id in enumerate(image_ids)}
 
 
@@ -189,22 +184,3 @@ def _check_cameras(sparse_path: Path, images_path: Path, images: list[Any]) -> N
                 f"run `colmap image_undistorter --image_path {image_path} --input_path "
                 f"{input_path} --output_path DENSE` and point at DENSE."
             )
-
-
-def _broken(sparse_path: Path, error: Exception) -> WorkspaceError:
-    reason = " ".join(str(error).split())[:200]
-    return WorkspaceError(
-        f"{sparse_path}: the model cannot be read ({reason}); "
-        "copy it again or export it again with `colmap model_converter`."
-    )
-
-
-@contextlib.contextmanager
-def _quiet_pycolmap() -> Iterator[None]:
-    """Keep COLMAP's log off stderr: what matters is raised."""
-    level = pycolmap.logging.minloglevel
-    pycolmap.logging.minloglevel = int(pycolmap.logging.FATAL)
-    try:
-        yield
-    finally:
-        pycolmap.logging.minloglevel = level
