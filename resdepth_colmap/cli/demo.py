@@ -33,13 +33,13 @@ def demo(output: Path, **values: Any) -> None:
     from resdepth_colmap.cli.log import BarProgress
     from resdepth_colmap.cli.printed import show_comparison, show_run
     from resdepth_colmap.evaluation.truth import compare_with_truth
-    from resdepth_colmap.pipeline.run import run_refine
+    from resdepth_colmap.report.refine_and_report import refine_and_report
     from resdepth_colmap.training.synthesize import synthesize
 
     progress = BarProgress()
     with progress.stage("Rendering", 1) as advance:
         (room,) = synthesize(output, config, lambda _done, _total: advance(1))
-    result = run_refine(room, RunConfig(backend=StereoBackend.CPU), progress)
+    result = refine_and_report(room, RunConfig(backend=StereoBackend.CPU), progress)
     images = result.refine.images
     kinds = {name: record["input"] for name, record in images.items()}
     show_comparison(compare_with_truth(result.refine.output, kinds))

@@ -16,6 +16,7 @@ COMMANDS = (
     "fuse",
     "export",
     "info",
+    "report",
     "evaluate",
     "demo",
     "synthesize",

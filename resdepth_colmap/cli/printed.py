@@ -56,6 +56,8 @@ def show_run(result: "RunResult") -> None:
         show_line("cloud", f"{result.cloud_path} ({points})")
     if result.overview_path is not None:
         show_line("pictures", result.overview_path)
+    if result.report_path is not None:
+        show_line("report", result.report_path)
     show_line("record", refine.output.record_path)
 
 

@@ -47,6 +47,7 @@ from resdepth_colmap.pipeline.run_config import CloudFormat, RunConfig
 )
 @click.option("--no-fuse", is_flag=True, help="Stop after the depth maps.")
 @click.option("--no-pictures", is_flag=True, help="Make no pictures of the change.")
+@click.option("--no-report", is_flag=True, help="Write no report.html.")
 @click.option(
     "--in-place",
     is_flag=True,
@@ -54,7 +55,9 @@ from resdepth_colmap.pipeline.run_config import CloudFormat, RunConfig
     "originals are kept beside them.",
 )
 @overwrite_option
-def refine(workspace: Path, backend: StereoBackend, **values: Any) -> None:
+def refine(
+    workspace: Path, backend: StereoBackend, no_report: bool, **values: Any
+) -> None:
     """Refine the depth maps of WORKSPACE and fuse them into a cloud.
 
     WORKSPACE is the folder that `colmap image_undistorter` wrote. The result goes to
@@ -71,8 +74,10 @@ def refine(workspace: Path, backend: StereoBackend, **values: Any) -> None:
     from resdepth_colmap.cli.log import BarProgress
     from resdepth_colmap.cli.printed import show_run
     from resdepth_colmap.pipeline.run import run_refine
+    from resdepth_colmap.report.refine_and_report import refine_and_report
 
-    show_run(run_refine(workspace, config, BarProgress()))
+    run = run_refine if no_report else refine_and_report
+    show_run(run(workspace, config, BarProgress()))
 
 
 _RUN_OPTIONS = ("no_fuse", "no_pictures", "cloud_format", "in_place", "overwrite")

@@ -16,6 +16,11 @@ def cloud_path(output: OutputWorkspace, cloud_format: str) -> Path:
     return output.path / f"fused.{cloud_format}"
 
 
+def cloud_before_path(output: OutputWorkspace) -> Path:
+    """Where a sample of the cloud of the initial maps goes, to be shown beside it."""
+    return output.path / "fused_before_sample.ply"
+
+
 def fuse_to_file(
     path: Path,
     config: FuseConfig,

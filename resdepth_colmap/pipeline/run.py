@@ -13,12 +13,12 @@ from resdepth_colmap.config import Fuser
 from resdepth_colmap.errors import FusionError
 from resdepth_colmap.io.model import read_scene
 from resdepth_colmap.io.output import OutputWorkspace, read_record, write_record
-from resdepth_colmap.io.point_cloud import PointCloud, write_cloud
+from resdepth_colmap.io.point_cloud import write_cloud
 from resdepth_colmap.io.workspace import Workspace, check_images, open_workspace
 from resdepth_colmap.network.device import resolve_device
 from resdepth_colmap.network.weights import load_weights
 from resdepth_colmap.pipeline.fuse import fuse_initial, fuse_workspace
-from resdepth_colmap.pipeline.fuse_to_file import cloud_path
+from resdepth_colmap.pipeline.fuse_to_file import cloud_before_path, cloud_path
 from resdepth_colmap.pipeline.progress import Progress, SilentProgress
 from resdepth_colmap.pipeline.refine_workspace import RefineReport, refine_workspace
 from resdepth_colmap.pipeline.run_config import RunConfig
@@ -29,7 +29,7 @@ from resdepth_colmap.scene import Scene
 logger = logging.getLogger(__name__)
 
 MOST_POINTS_SHOWN = 150_000
-"""Points of a cloud that are kept to be shown."""
+"""Points that are kept of a cloud which is there to be shown."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -43,7 +43,6 @@ class RunResult:
         num_points: Its points.
         num_points_before: Points that the initial maps give, fused in the same way;
             None if nobody counted them.
-        cloud_before: A sample of these points, `MOST_POINTS_SHOWN` at most, to show.
         overview_path: The picture of the whole workspace; None without pictures.
         report_path: The page that shows all of it; None as long as nobody wrote it.
     """
@@ -53,7 +52,6 @@ class RunResult:
     cloud_path: Path | None = None
     num_points: int = 0
     num_points_before: int | None = None
-    cloud_before: PointCloud | None = None
     overview_path: Path | None = None
     report_path: Path | None = None
 
@@ -173,11 +171,11 @@ class _Run:
                 self.workspace, self.scene, kinds, self.config.fuse, self.progress
             )
         self.facts["fuse_before"] = dataclasses.asdict(before.statistics)
-        return dataclasses.replace(
-            result,
-            num_points_before=len(before.cloud),
-            cloud_before=before.cloud.sampled(MOST_POINTS_SHOWN),
-        )
+        path = cloud_before_path(self.output)
+        path.unlink(missing_ok=True)
+        if len(before.cloud):
+            write_cloud(path, before.cloud.sampled(MOST_POINTS_SHOWN))
+        return dataclasses.replace(result, num_points_before=len(before.cloud))
 
     def _draw(self, result: RunResult) -> RunResult:
         from resdepth_colmap.pipeline.pictures import draw_workspace  # fonts: slow

@@ -1,0 +1,176 @@
+"""The fused clouds and the cameras, small enough for a page."""
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from resdepth_colmap.io.png import encode_png
+from resdepth_colmap.io.point_cloud import PointCloud
+from resdepth_colmap.report.packing import MAX_VALUE, byte_planes
+from resdepth_colmap.scene import Camera, Matrix, View
+
+SIZE = 10.0
+"""Longest side of the box of points in the page's own units."""
+
+_ROBUST_PERCENT = (1.0, 99.0)
+_MARGIN = 0.5  # of the robust box, on each side
+_CAMERA_SIZE = 0.02  # of the box
+_DECIMALS = 4
+
+_FOV_DEG = 50.0
+_ASPECT = 1.7
+_LOOK_DOWN = 0.25  # of the way ahead
+_LOOK_ASIDE = 0.2
+_PERCENT_IN_SIGHT = 94.0
+_POINTS_LOOKED_AT = 20_000
+
+
+Positions = npt.NDArray[np.float32]
+
+
+class CloudBox(NamedTuple):
+    """The part of space that is shown: without the few points far from all others.
+
+    Attributes:
+        center: In the world frame, shape (3,), float64.
+        scale: Page units for each workspace unit.
+    """
+
+    center: Matrix
+    scale: float
+
+    @classmethod
+    def of(cls, *clouds: PointCloud) -> Self:
+        """The box of what the clouds have in common; they hold at least one point."""
+        points = np.concatenate([cloud.points for cloud in clouds]).astype(np.float64)
+        low, high = np.percentile(points, _ROBUST_PERCENT, axis=0)
+        low, high = low - _MARGIN * (high - low), high + _MARGIN * (high - low)
+        inside = points[((points >= low) & (points <= high)).all(axis=1)]
+        inside = inside if len(inside) else points
+        low, high = inside.min(axis=0), inside.max(axis=0)
+        extent = float((high - low).max()) or 1.0
+        return cls((low + high) / 2, SIZE / extent)
+
+    def shown(self, xyz_in_world: npt.ArrayLike) -> Matrix:
+        """Points in page units, the box's centre in the middle."""
+        shifted = np.asarray(xyz_in_world, np.float64) - self.center
+        return np.asarray(shifted * self.scale, np.float64)
+
+
+class PackedCloud(NamedTuple):
+    """A cloud as two PNG files.
+
+    Attributes:
+        points: Grey, shape (6, N): x high, y high, z high, x low, y low, z low; the
+            whole box is 0..65535.
+        colors: RGB, shape (1, N, 3).
+        num_points: N.
+    """
+
+    points: bytes
+    colors: bytes
+    num_points: int
+
+
+def packed_cloud(cloud: PointCloud, box: CloudBox, most: int) -> PackedCloud | None:
+    """At most so many points of a cloud, ordered so that neighbours are neighbours.
+
+    Returns:
+        The points inside the box; None if there is none.
+    """
+    sample = cloud.sampled(most)
+    unit = box.shown(sample.points) / SIZE + 0.5
+    inside = ((unit >= 0) & (unit <= 1)).all(axis=1)
+    if not inside.any():
+        return None
+    values = np.rint(unit[inside] * MAX_VALUE).astype(np.uint16)
+    order = np.argsort(_morton(values), kind="stable")
+    return PackedCloud(
+        points=encode_png(byte_planes(np.ascontiguousarray(values[order].T))),
+        colors=encode_png(np.ascontiguousarray(sample.colors[inside][order][None])),
+        num_points=len(order),
+    )
+
+
+def first_look(
+    views: Sequence[View], points: Positions, box: CloudBox
+) -> dict[str, Any]:
+    """Where to stand at first: about where the cameras are, to have most in sight.
+
+    Args:
+        views: The cameras; at least one.
+        points: The cloud in the world frame, shape (N, 3).
+        box: What is shown.
+
+    Returns:
+        "eye", "target" and "up" in page units, the vertical field of view "fov_deg"
+        and the "aspect" that it was chosen for, for JSON.
+    """
+    poses = np.array([view.cam_from_world for view in views])
+    right, down, forward = (_direction(poses[:, axis, :3]) for axis in range(3))
+    direction = forward + _LOOK_DOWN * down - _LOOK_ASIDE * right
+    direction /= np.linalg.norm(direction)
+    shown = box.shown(points[:: max(1, len(points) // _POINTS_LOOKED_AT)])
+    target = np.median(shown, axis=0)
+    side = np.cross(direction, -down)
+    side /= np.linalg.norm(side)
+    top = np.cross(side, direction)
+    tangent = math.tan(math.radians(_FOV_DEG / 2))
+    offset = shown - target
+    # The distance from which a point is in sight, by its height, and by its width.
+    height = np.abs(offset @ top) / tangent
+    width = np.abs(offset @ side) / (tangent * _ASPECT)
+    needed = np.maximum(height, width) - offset @ direction
+    distance = max(float(np.percentile(needed, _PERCENT_IN_SIGHT)), 0.05 * SIZE)
+    return {
+        "eye": _rounded(target - distance * direction),
+        "target": _rounded(target),
+        "up": _rounded(-down),
+        "fov_deg": _FOV_DEG,
+        "aspect": _ASPECT,
+    }
+
+
+def camera_outline(view: View, box: CloudBox) -> list[list[float]]:
+    """Apex and four corners of a camera's pyramid, in page units."""
+    camera = view.camera
+    length = _CAMERA_SIZE * SIZE / box.scale
+    corners = _corner_rays(camera) * length
+    rotation, translation = view.cam_from_world[:, :3], view.cam_from_world[:, 3]
+    corners_in_world = (corners - translation) @ rotation
+    outline = np.vstack([view.center_in_world, corners_in_world])
+    return [_rounded(point) for point in box.shown(outline)]
+
+
+def _direction(directions: Matrix) -> Matrix:
+    """The mean of directions; the first, where they cancel out, as round an object."""
+    mean = directions.mean(axis=0)
+    length = float(np.linalg.norm(mean))
+    return np.asarray(mean / length if length > 0.3 else directions[0], np.float64)
+
+
+def _corner_rays(camera: Camera) -> Matrix:
+    left, right = -camera.cx / camera.fx, (camera.width_px - camera.cx) / camera.fx
+    top, bottom = -camera.cy / camera.fy, (camera.height_px - camera.cy) / camera.fy
+    return np.array(
+        [[left, top, 1], [right, top, 1], [right, bottom, 1], [left, bottom, 1]]
+    )
+
+
+def _rounded(xyz: Matrix) -> list[float]:
+    return [round(float(value), _DECIMALS) for value in xyz]
+
+
+def _morton(values: npt.NDArray[np.uint16]) -> npt.NDArray[np.uint64]:
+    """Place of each point on the Z-order curve, from the top 10 bits of x, y and z."""
+    code = np.zeros(len(values), np.uint64)
+    for axis in range(3):
+        coordinate = (values[:, axis] >> 6).astype(np.uint64)
+        for bit in range(10):
+            code |= ((coordinate >> np.uint64(bit)) & np.uint64(1)) << np.uint64(
+                3 * bit + axis
+            )
+    return code

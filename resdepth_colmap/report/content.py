@@ -1,0 +1,134 @@
+"""What goes into the page: facts for JSON, and blocks of pictures and clouds."""
+
+import base64
+import dataclasses
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from resdepth_colmap.io.point_cloud import PointCloud
+from resdepth_colmap.pipeline.depth_colors import (
+    DEPTH_COLORS,
+    DIFFERENCE_COLORS,
+    ERROR_COLORS,
+    ERROR_RANGE,
+    color_bar,
+)
+from resdepth_colmap.report.budget import Budget
+from resdepth_colmap.report.cloud_data import (
+    SIZE,
+    CloudBox,
+    camera_outline,
+    first_look,
+    packed_cloud,
+)
+from resdepth_colmap.report.image_maps import ImageMaps
+from resdepth_colmap.report.packing import (
+    CONFIDENCE_LEVELS,
+    DepthCode,
+    packed_confidence,
+    packed_photo,
+)
+from resdepth_colmap.scene import View
+
+CONFIDENCE_COLORS = "viridis"
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Content:
+    """Part of a page.
+
+    Attributes:
+        facts: Plain values for the page's JSON.
+        blocks: Binary data by id.
+    """
+
+    facts: Mapping[str, Any]
+    blocks: Mapping[str, bytes]
+
+    @property
+    def num_bytes(self) -> int:
+        """Bytes of the blocks in the page."""
+        return sum(4 * (len(block) + 2) // 3 + 60 for block in self.blocks.values())
+
+
+def image_content(
+    index: int, maps: ImageMaps, facts: Mapping[str, Any], budget: Budget
+) -> Content:
+    """Photo and maps of one image.
+
+    Args:
+        index: Its place among those shown.
+        maps: Its maps, larger than shown or not.
+        facts: What is said of it.
+        budget: How large the maps may be.
+    """
+    small = maps.sampled(budget.map_pixels)
+    code = DepthCode.of(budget.depth_step, small.before, small.after, small.truth)
+    height_px, width_px = small.before.shape
+    blocks = {
+        "photo": packed_photo(maps.rgb, budget.photo_side_px(small.before.shape)),
+        "before": code.packed(small.before),
+        "after": code.packed(small.after),
+    }
+    if small.confidence is not None:
+        blocks["confidence"] = packed_confidence(small.confidence)
+    if small.truth is not None:
+        blocks["truth"] = code.packed(small.truth)
+    shown = {
+        "mapWidth": width_px,
+        "mapHeight": height_px,
+        "code": {"nearest": code.nearest, "step": code.step},
+        "blocks": list(blocks),
+    }
+    return Content(
+        facts={**facts, **shown},
+        blocks={f"image-{index}-{name}": block for name, block in blocks.items()},
+    )
+
+
+def cloud_content(
+    after: PointCloud, before: PointCloud | None, views: Sequence[View], budget: Budget
+) -> Content:
+    """Both clouds, the cameras, and where to look from."""
+    clouds = {"after": after, "before": before}
+    known = {name: c for name, c in clouds.items() if c is not None and len(c)}
+    box = CloudBox.of(*known.values())
+    facts: dict[str, Any] = {
+        "size": SIZE,
+        "look": first_look(views, after.points, box),
+        "cameras": [camera_outline(view, box) for view in views],
+        "clouds": {},
+    }
+    blocks = {}
+    for name, cloud in known.items():
+        packed = packed_cloud(cloud, box, budget.num_points)
+        if packed is None:
+            continue
+        facts["clouds"][name] = {"shown": packed.num_points}
+        blocks[f"cloud-{name}-points"] = packed.points
+        blocks[f"cloud-{name}-colors"] = packed.colors
+    return Content(facts=facts, blocks=blocks)
+
+
+def color_tables() -> dict[str, Any]:
+    """The colours that all pictures of this package use, 256 RGB values each."""
+    names = {
+        "depth": DEPTH_COLORS,
+        "difference": DIFFERENCE_COLORS,
+        "error": ERROR_COLORS,
+        "confidence": CONFIDENCE_COLORS,
+    }
+    tables = {
+        key: base64.b64encode(color_bar(name, 256, 1).tobytes()).decode("ascii")
+        for key, name in names.items()
+    }
+    return {
+        "tables": tables,
+        "errorRange": list(ERROR_RANGE),
+        "confidenceLevels": CONFIDENCE_LEVELS,
+    }
+
+
+def total_bytes(contents: Iterable[Content]) -> int:
+    """Bytes of all blocks in the page."""
+    return sum(content.num_bytes for content in contents)

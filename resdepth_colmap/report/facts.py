@@ -1,0 +1,167 @@
+"""What the page says in words and numbers, out of the run record and the maps."""
+
+import collections
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from resdepth_colmap.evaluation.depth_metrics import depth_metrics
+from resdepth_colmap.pipeline.depth_colors import (
+    DepthScale,
+    difference_limit,
+    relative_difference,
+)
+from resdepth_colmap.report.image_maps import ImageMaps
+
+MOST_NAMED = 100
+_DIGITS = 6
+_OVERALL = ("mae", "rmse", "medae", "bad_1", "bad_2")
+
+Record = Mapping[str, Any]
+"""A run record, or a part of it, as it was read."""
+
+
+def image_facts(maps: ImageMaps, record: Record) -> dict[str, Any]:
+    """What is said of one image, all of it computed from the full maps."""
+    scale = DepthScale.of(maps.after, maps.before)
+    change = relative_difference(maps.before, maps.after)
+    size = np.abs(change[np.isfinite(change)])
+    height_px, width_px = maps.before.shape
+    return {
+        "name": maps.name,
+        "width": width_px,
+        "height": height_px,
+        "scale": {"least": scale.least, "most": scale.most, "ticks": scale.ticks()},
+        "limit": difference_limit(change),
+        "filled": [_share(maps.before > 0), _share(maps.after > 0)],
+        "change": float(np.median(size)) if size.size else None,
+        "input": str(record.get("input", "")),
+        "sources": _sources(record),
+        "seconds": _number(record.get("seconds")),
+        "metrics": _metrics(maps),
+    }
+
+
+def summary_facts(
+    record: Record, images: Sequence[Record], num_pixels: int
+) -> dict[str, Any]:
+    """What is said of the whole workspace.
+
+    Args:
+        record: The run record.
+        images: The facts of each image.
+        num_pixels: Pixels of all refined maps.
+
+    Returns:
+        Plain values; pairs are before and after, None = not known.
+    """
+    records = [r for r in _mapping(record, "images").values() if isinstance(r, Mapping)]
+    fuse, fuse_before = _mapping(record, "fuse"), _mapping(record, "fuse_before")
+    return {
+        "num_images": len(records),
+        "coverage": [_mean(records, f"filled_{when}") for when in ("before", "after")],
+        "agreement": [_agreeing(f, f.get("num_pixels")) for f in (fuse_before, fuse)],
+        "confirmed": [_agreeing(f, num_pixels) for f in (fuse_before, fuse)],
+        "num_views_needed": _number(fuse.get("num_views_needed")),
+        "points": [
+            _number(fuse.get("points_before_refinement")),
+            _number(fuse.get("points")),
+        ],
+        "fuse_error": fuse.get("error"),
+        "seconds": {
+            str(stage): value
+            for stage, value in _mapping(record, "seconds").items()
+            if _number(value) is not None
+        },
+        "peak_memory_mb": _number(record.get("peak_memory_mb")),
+        "metrics": _mean_metrics(images),
+        "finished": str(record.get("finished", "")),
+        "device": str(record.get("device", "")),
+        "weights": str(record.get("weights_sha256", "")),
+        "stereo": str(_mapping(record, "stereo").get("backend", "")),
+        "workspace": str(record.get("workspace", "")),
+        "options": _mapping(record, "options"),
+        "versions": _mapping(record, "versions"),
+    }
+
+
+def left_out_facts(left_out: Mapping[str, str]) -> list[dict[str, Any]]:
+    """Reasons, each with the images it keeps from being shown (some of very many)."""
+    names = collections.defaultdict(list)
+    for name, reason in left_out.items():
+        names[reason].append(name)
+    return [
+        {"reason": reason, "number": len(found), "names": found[:MOST_NAMED]}
+        for reason, found in list(names.items())[:MOST_NAMED]
+    ]
+
+
+def rounded(value: Any) -> Any:
+    """The same with numbers of a few digits, ready for JSON: NaN becomes None."""
+    if isinstance(value, float):
+        return float(f"{value:.{_DIGITS}g}") if math.isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {str(key): rounded(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [rounded(item) for item in value]
+    return value
+
+
+def _metrics(maps: ImageMaps) -> list[dict[str, float | int | None]] | None:
+    """Errors before and after; none is discarded: rooms have no far background."""
+    truth = maps.truth
+    if truth is None:
+        return None
+    return [
+        depth_metrics(depth, truth, max_residual=None).to_mapping()
+        for depth in (maps.before, maps.after)
+    ]
+
+
+def _mean_metrics(images: Sequence[Record]) -> list[dict[str, float | None]] | None:
+    known = [image["metrics"] for image in images if image["metrics"]]
+    if not known:
+        return None
+    return [
+        {key: _mean([pair[when] for pair in known], key) for key in _OVERALL}
+        for when in (0, 1)
+    ]
+
+
+def _sources(record: Record) -> list[dict[str, Any]]:
+    sources = record.get("sources")
+    found = [s for s in sources if isinstance(s, Mapping)] if sources else []
+    keys = ("name", "reason", "num_shared_points", "angle_deg", "baseline")
+    return [{key: source.get(key) for key in keys} for source in found]
+
+
+def _agreeing(fuse: Record, num_pixels: Any) -> float | None:
+    """Share of pixels that other views confirm; None where nobody counted."""
+    counts = [_number(fuse.get(key)) for key in ("num_points", "num_explained")]
+    number = _number(num_pixels)
+    # COLMAP's fusion counts no explained pixels: 0 of them means unknown.
+    if not number or not counts[1] or counts[0] is None:
+        return None
+    return (counts[0] + counts[1]) / number
+
+
+def _mapping(record: Record, key: str) -> Record:
+    value = record.get(key)
+    return value if isinstance(value, Mapping) else {}
+
+
+def _mean(records: Sequence[Record], key: str) -> float | None:
+    values = [_number(record.get(key)) for record in records]
+    known = [value for value in values if value is not None]
+    return sum(known) / len(known) if known else None
+
+
+def _number(value: Any) -> float | int | None:
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    return value if is_number and math.isfinite(value) else None
+
+
+def _share(flags: Any) -> float:
+    return float(np.mean(flags))

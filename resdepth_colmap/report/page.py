@@ -1,0 +1,71 @@
+"""The page: a template, styles and scripts of this package, and the data in it."""
+
+import base64
+import html
+import importlib.resources
+import json
+import string
+from collections.abc import Mapping
+from typing import Any
+
+ASSETS = "assets"
+TEMPLATE = "report.html"
+NOTICE = "vendor/NOTICE.txt"
+STYLES = ("vendor/uPlot.min.css", "report.css")
+SCRIPTS = (
+    "vendor/three.min.js",
+    "vendor/uPlot.iife.min.js",
+    "elements.js",
+    "blocks.js",
+    "maps.js",
+    "charts.js",
+    "summary.js",
+    "stage.js",
+    "gallery.js",
+    "table.js",
+    "cloud.js",
+    "main.js",
+)
+
+Blocks = Mapping[str, bytes]
+"""Binary data by the id that the scripts look it up by."""
+
+
+def render_page(title: str, data: Mapping[str, Any], blocks: Blocks) -> str:
+    """The whole page as text; it asks for nothing from any network.
+
+    Args:
+        title: What the workspace is called; any text.
+        data: What the scripts read, plain values; any text may be in it.
+        blocks: What they decode when it is looked at; ids are ours.
+    """
+    template = string.Template(read_asset(TEMPLATE))
+    return template.substitute(
+        title=html.escape(title),
+        styles="\n".join(f"<style>\n{read_asset(name)}</style>" for name in STYLES),
+        data=safe_json(data),
+        notice=html.escape(read_asset(NOTICE)),
+        blocks="\n".join(_block(name, content) for name, content in blocks.items()),
+        scripts="\n".join(f"<script>\n{read_asset(n)}</script>" for n in SCRIPTS),
+    )
+
+
+def safe_json(data: Mapping[str, Any]) -> str:
+    """JSON that may stand in a script element, whatever its strings hold.
+
+    It is ASCII and has no "<": nothing in it can end the element or open a comment, and
+    names that are not valid Unicode survive.
+    """
+    text = json.dumps(data, allow_nan=False, separators=(",", ":"))
+    return text.replace("<", "\\u003c").replace(">", "\\u003e")
+
+
+def read_asset(name: str) -> str:
+    """The text of a file of this package."""
+    folder = importlib.resources.files(__package__) / ASSETS
+    return (folder / name).read_text(encoding="utf-8")
+
+
+def _block(name: str, content: bytes) -> str:
+    text = base64.b64encode(content).decode("ascii")
+    return f'<script type="text/plain" id="{html.escape(name)}">{text}</script>'

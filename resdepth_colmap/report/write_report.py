@@ -1,0 +1,200 @@
+"""Stage "report": the page of a workspace, out of its maps, cloud and run record."""
+
+import logging
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from resdepth_colmap.errors import WorkspaceError
+from resdepth_colmap.io.files import write_whole
+from resdepth_colmap.io.model import read_scene
+from resdepth_colmap.io.output import OutputWorkspace, read_record
+from resdepth_colmap.io.point_cloud import read_cloud
+from resdepth_colmap.io.workspace import open_workspace
+from resdepth_colmap.pipeline.fuse_to_file import cloud_before_path, cloud_path
+from resdepth_colmap.pipeline.pictures import evenly_chosen
+from resdepth_colmap.pipeline.progress import Progress, SilentProgress
+from resdepth_colmap.report.budget import MOST_BYTES, MOST_IMAGES, Budget
+from resdepth_colmap.report.content import (
+    Content,
+    cloud_content,
+    color_tables,
+    image_content,
+    total_bytes,
+)
+from resdepth_colmap.report.facts import (
+    image_facts,
+    left_out_facts,
+    rounded,
+    summary_facts,
+)
+from resdepth_colmap.report.image_maps import ImageMaps, load_maps
+from resdepth_colmap.report.page import render_page
+from resdepth_colmap.scene import Scene
+
+logger = logging.getLogger(__name__)
+
+REPORT_NAME = "report.html"
+
+
+def write_report(path: Path, progress: Progress | None = None) -> Path:
+    """Write the report of a refined workspace.
+
+    An image whose maps have vanished or do not belong together is left out, and the
+    page says why.
+
+    Args:
+        path: The workspace, or a parent of it.
+        progress: Is told of each image.
+
+    Returns:
+        The page, `resdepth/report.html`.
+
+    Raises:
+        WorkspaceError: If nothing was refined, no image can be shown, or the page
+            cannot be written.
+    """
+    workspace = open_workspace(path)
+    scene = read_scene(workspace.sparse_path, workspace.images_path, workspace.path)
+    record = read_record(OutputWorkspace(source=workspace).record_path)
+    options = record.get("options")
+    in_place = isinstance(options, dict) and options.get("in_place") is True
+    output = OutputWorkspace(source=workspace, in_place=in_place)
+    report = _Report(output, scene, record, progress or SilentProgress())
+    text = report.rendered()
+    target = output.path / REPORT_NAME
+    write_whole(target, text.encode("utf-8"))
+    return target
+
+
+class _Report:
+    """One report: what it is made of, and what had to be left out."""
+
+    def __init__(
+        self,
+        output: OutputWorkspace,
+        scene: Scene,
+        record: Mapping[str, Any],
+        progress: Progress,
+    ) -> None:
+        self.output = output
+        self.scene = scene
+        self.record = record
+        self.progress = progress
+        self.images = _refined_images(output, scene, record)
+        self.left_out: dict[str, str] = {}
+
+    def rendered(self) -> str:
+        shown = evenly_chosen(list(self.images), MOST_IMAGES)
+        budget = Budget.of(len(shown))
+        cloud = self._cloud(budget)
+        fixed = len(self._page([], cloud))
+        budget = self._tried(shown, budget, MOST_BYTES - fixed)
+        while True:
+            contents = self._image_contents(shown, budget)
+            page = self._page(contents, cloud)
+            if len(page) <= MOST_BYTES:
+                return page
+            num_bytes = total_bytes(contents)
+            spare = MOST_BYTES - (len(page) - num_bytes)
+            budget = budget.shrunk(num_bytes, spare)
+
+    def _page(self, contents: list[Content], cloud: Content | None) -> str:
+        images = [content.facts for content in contents]
+        pixels = sum(image["width"] * image["height"] for image in images)
+        num_pixels = round(pixels * len(self.images) / max(1, len(images)))
+        title = self.output.source.path.resolve().name
+        data = {
+            "title": title,
+            "summary": summary_facts(self.record, images, num_pixels),
+            "skipped": left_out_facts(_strings(self.record.get("skipped"))),
+            "leftOut": left_out_facts(self.left_out),
+            "images": images,
+            "cloud": None if cloud is None else cloud.facts,
+            **color_tables(),
+        }
+        blocks: dict[str, bytes] = {}
+        for content in [*contents, *([] if cloud is None else [cloud])]:
+            blocks.update(content.blocks)
+        return render_page(title, rounded(data), blocks)
+
+    def _tried(self, shown: list[str], budget: Budget, available: float) -> Budget:
+        """A budget by which some of the images take no more than their share."""
+        names = evenly_chosen(shown, _NUM_TRIED)
+        tried = [maps for maps in map(self._load, names) if maps is not None]
+        share = available * len(tried) / len(shown)
+        for _ in range(_MOST_TRIALS):
+            size = sum(
+                image_content(0, maps, _SPACE_FOR_FACTS, budget).num_bytes
+                for maps in tried
+            )
+            size += len(_SPACE_FOR_FACTS["facts"]) * len(tried)
+            if size <= share:
+                break
+            budget = budget.shrunk(size, share)
+        return budget
+
+    def _image_contents(self, names: list[str], budget: Budget) -> list[Content]:
+        contents: list[Content] = []
+        with self.progress.stage("Reporting", len(names)) as advance:
+            for name in names:
+                maps = self._load(name)
+                if maps is not None:
+                    facts = image_facts(maps, self.images[name])
+                    contents.append(image_content(len(contents), maps, facts, budget))
+                advance(1)
+        if not contents:
+            reason = next(iter(self.left_out.values()))
+            raise WorkspaceError(
+                f"{self.output.path}: no image can be shown: {reason.rstrip('.')}; run "
+                f"`resdepth-colmap refine {self.output.source.path}` again."
+            )
+        return contents
+
+    def _load(self, name: str) -> ImageMaps | None:
+        """The maps of an image; None if they cannot be had, which is said once."""
+        if name in self.left_out:
+            return None
+        try:
+            return load_maps(self.output, name, str(self.images[name].get("input")))
+        except WorkspaceError as error:
+            self.left_out[name] = str(error)
+            logger.warning("%s is left out of the report: %s", name, error)
+            return None
+
+    def _cloud(self, budget: Budget) -> Content | None:
+        path = cloud_path(self.output, "ply")
+        before_path = cloud_before_path(self.output)
+        if not path.is_file():
+            return None
+        before = read_cloud(before_path) if before_path.is_file() else None
+        views = [view for view in self.scene.views if view.name in self.images]
+        return cloud_content(read_cloud(path), before, views, budget)
+
+
+_NUM_TRIED = 4
+_MOST_TRIALS = 20
+_SPACE_FOR_FACTS = {"facts": " " * 1200}  # of one image, in the page's JSON
+
+
+def _refined_images(
+    output: OutputWorkspace, scene: Scene, record: Mapping[str, Any]
+) -> dict[str, Mapping[str, Any]]:
+    """The record of each refined image, in the order of the model."""
+    way_out = f"run `resdepth-colmap refine {output.source.path}` first"
+    if not record:
+        raise WorkspaceError(
+            f"{output.record_path}: no record of a refinement; {way_out}."
+        )
+    known = record.get("images")
+    known = known if isinstance(known, dict) else {}
+    names = [view.name for view in scene.views if view.name in known]
+    images = {name: known[name] for name in names if isinstance(known[name], dict)}
+    if not images:
+        raise WorkspaceError(f"{output.record_path}: no refined map; {way_out}.")
+    return images
+
+
+def _strings(value: Any) -> dict[str, str]:
+    pairs = value.items() if isinstance(value, dict) else ()
+    return {str(name): str(reason) for name, reason in pairs}
