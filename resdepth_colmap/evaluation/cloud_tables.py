@@ -32,6 +32,7 @@ def cloud_table(measured: Mapping[str, Any]) -> str:
             count(size["num_points"]),
             count(size["num_scan_points"]),
             number(size["seconds"], digits=1),
+            number(size["cpu_seconds"], digits=1),
             f"{size['peak_memory_mb'] / 1024:.2f} GiB",
         ]
         for size in measured["sizes"]
@@ -43,7 +44,8 @@ def cloud_table(measured: Mapping[str, Any]) -> str:
             f"{largest_difference(measured) * 100:.4f} percentage points.",
             markdown_table(header, rows),
             markdown_table(
-                "points of the cloud | points of the scan | seconds | peak memory",
+                "points of the cloud | points of the scan | seconds | "
+                "processor seconds | peak memory",
                 sizes,
                 num_texts=0,
             ),

@@ -10,11 +10,12 @@ def measured() -> dict[str, Any]:
     ours = {**scores, "f1": [0.302, 0.8]}
     case = {"tolerances": [0.01, 0.5], "official": scores, "ours": ours}
     size = {"num_points": 1000000, "num_scan_points": 2000, "seconds": 4.56}
+    times = {"cpu_seconds": 3.21, "peak_memory_mb": 512}
     return {
         "command": "python bench.py",
         "date": "2026-01-02",
         "cases": {"two_scans": case, "exact": {**case, "ours": scores}},
-        "sizes": [{**size, "peak_memory_mb": 512}],
+        "sizes": [{**size, **times}],
     }
 
 
@@ -23,7 +24,7 @@ def test_every_score_has_the_official_one_beside_it() -> None:
     cells = "50.000 % | 50.000 % | 25.000 % | 25.000 % | 30.000 % | 30.200 %"
     assert f"| two scans | 0.01 | {cells} |" in text
     assert text.count("| exact |") == 2
-    assert "| 1,000,000 | 2,000 | 4.6 | 0.50 GiB |" in text
+    assert "| 1,000,000 | 2,000 | 4.6 | 3.2 | 0.50 GiB |" in text
     assert "`python bench.py` on 2026-01-02" in text
     first, second = (part for part in text.split("\n\n") if part.startswith("|"))
     for table in (first, second):
