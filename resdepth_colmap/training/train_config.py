@@ -86,7 +86,12 @@ class TrainConfig(Config):
     samples: Path | None = None
 
     def __post_init__(self) -> None:
-        """Check the ranges once, so that no later code has to."""
+        """Turn plain strings into their enums and check the ranges."""
+        for name, kind in _WORDS.items():
+            value = getattr(self, name)
+            choices = [str(choice) for choice in kind]
+            self._check(value in choices, " or ".join(choices), **{name: value})
+            object.__setattr__(self, name, kind(value))
         for name in _AT_LEAST_ONE:
             value = getattr(self, name)
             self._check(value >= 1, "at least 1", **{name: value})
@@ -127,6 +132,11 @@ class TrainConfig(Config):
         return cls.from_mapping({**chosen, **(options or {})})
 
 
+_WORDS: dict[str, type[enum.StrEnum]] = {
+    "optimiser": Optimiser,
+    "schedule": Schedule,
+    "device": Device,
+}
 _AT_LEAST_ONE = (
     "steps",
     "batch_size",

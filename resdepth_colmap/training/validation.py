@@ -21,7 +21,7 @@ from resdepth_colmap.training.loss import refinement_loss
 from resdepth_colmap.training.train_config import TrainConfig
 
 NUM_BATCHES = 8
-NUM_PICTURES = 3
+NUM_PICTURES = 2
 
 # The network by itself: no rule after it hides what it does to good pixels.
 _REFINING = RefineConfig(passes=1, keep_confirmed=False)

@@ -29,6 +29,13 @@ def test_the_default_preset_is_the_default() -> None:
     assert TrainConfig.of(Preset.DEFAULT, {"steps": 9}) == TrainConfig(steps=9)
 
 
+def test_a_mapping_makes_the_same_configuration_again() -> None:
+    config = TrainConfig.of(Preset.PAPER)
+    again = TrainConfig.from_mapping(config.to_mapping())
+    assert again == config
+    assert again.schedule is Schedule.CONSTANT
+
+
 @pytest.mark.parametrize(
     "options",
     [
@@ -42,6 +49,8 @@ def test_the_default_preset_is_the_default() -> None:
         {"log_weight": -0.1},
         {"loaders": 0},
         {"pace": 1},
+        {"schedule": "slow"},
+        {"optimiser": "sgd"},
     ],
 )
 def test_a_value_out_of_range_is_refused_by_name(options: dict[str, Any]) -> None:
