@@ -24,7 +24,12 @@ CACHE_NAME = "resdepth-cache"
     "evaluate eth3d ETH3D/",
     "evaluate eth3d ETH3D/ --scene office --scene pipes --output eth3d.json",
 )
-@click.argument("root", metavar="ETH3D_ROOT", type=click.Path(path_type=Path))
+@click.argument(
+    "root",
+    metavar="ETH3D_ROOT",
+    envvar="RESDEPTH_ETH3D",
+    type=click.Path(path_type=Path),
+)
 @click.option(
     "--scene", "scenes", multiple=True, help="Compare this scene; may be repeated."
 )
@@ -72,7 +77,8 @@ def eth3d(
 
     ETH3D_ROOT is the folder that the archives of the high-resolution multi-view scenes
     were unpacked into: dslr_undistorted, dslr_jpg and dslr_depth of each
-    (scripts/prepare_eth3d.py fetches them). Depth is matched in each pair's first image
+    (scripts/prepare_eth3d.py fetches them); the environment variable RESDEPTH_ETH3D may
+    name it instead. Depth is matched in each pair's first image
     against the second one alone. The table has the paper's figures beside it. A broken
     scene does not stop the others; the exit code is 1 then.
     """

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from resdepth_colmap.config import StereoBackend, StereoConfig
-from resdepth_colmap.errors import BackendUnavailableError
+from resdepth_colmap.errors import BackendUnavailableError, ConfigError
 from resdepth_colmap.evaluation.colmap_pair import match_by_colmap
 from resdepth_colmap.evaluation.depth_case import DepthCase, InitialDepth
 from resdepth_colmap.evaluation.match_cache import MatchCache, Matching
@@ -27,9 +27,15 @@ def matching_backend(requested: StereoBackend) -> StereoBackend:
     """Who matches: COLMAP where pycolmap has CUDA, else we do.
 
     Raises:
+        ConfigError: If existing maps were asked for: those are no one's to match.
         BackendUnavailableError: If COLMAP was asked for and has no CUDA here.
     """
-    if requested not in (StereoBackend.AUTO, StereoBackend.COLMAP):
+    if requested is StereoBackend.EXISTING:
+        raise ConfigError(
+            "--stereo existing: the scenes have no depth maps to compare; use auto, "
+            "cpu or colmap, or evaluate depth on a workspace that has maps."
+        )
+    if requested is StereoBackend.CPU:
         return StereoBackend.CPU
     import pycolmap
 

@@ -1,7 +1,7 @@
 """What the comparison of depth maps is made on: views whose depth is known."""
 
 import dataclasses
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -68,17 +68,21 @@ class CaseOptions:
     num_sources: int
 
 
+LazyCase = Callable[[], DepthCase]
+"""Reads a case; WorkspaceError if it is broken."""
+
+
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class SceneSource:
     """A scene that has not been read yet.
 
     Attributes:
         name: What it is called in the result; no other scene is called so.
-        read: Yields its cases, one after the other; WorkspaceError if it is broken.
+        read: Finds its cases, at least one; WorkspaceError if the scene is broken.
     """
 
     name: str
-    read: Callable[[CaseOptions], Iterator[DepthCase]]
+    read: Callable[[CaseOptions], Sequence[LazyCase]]
 
 
 def source_from_reference(case: DepthCase, source: MatchView) -> Matrix:

@@ -90,7 +90,7 @@ def evaluate_scenes(
     with listener.progress.stage("Evaluating", len(sources)) as advance:
         for source in sources:
             try:
-                result = _measure_scene(source, network, options, backend)
+                result = _measure_scene(source, network, options, backend, advance)
             except WorkspaceError as error:
                 failed[source.name] = " ".join(str(error).split())
                 if listener.on_failure:
@@ -99,7 +99,6 @@ def evaluate_scenes(
                 results.append(result)
                 if listener.on_scene:
                     listener.on_scene(result)
-            advance(1)
     return DepthReport(
         date=datetime.datetime.now(datetime.UTC).date(),
         weights_sha256=weights_hash(options.refine.weights),
@@ -117,6 +116,7 @@ def _measure_scene(
     network: ResDepthNet,
     options: EvaluationOptions,
     backend: StereoBackend,
+    on_share: Callable[[float], None],
 ) -> SceneResult:
     num_sources = max(1, network.config.num_sources)
     wanted = CaseOptions(stereo=options.stereo, num_sources=num_sources)
@@ -130,8 +130,12 @@ def _measure_scene(
             case, initial, network, options.refine, options.max_residual
         )
 
-    cases = tuple(measured(case) for case in source.read(wanted))
-    return SceneResult(name=source.name, cases=cases)
+    cases = source.read(wanted)
+    results = []
+    for read_case in cases:
+        results.append(measured(read_case()))
+        on_share(1 / len(cases))
+    return SceneResult(name=source.name, cases=tuple(results))
 
 
 def _warm_up(network: ResDepthNet, config: RefineConfig) -> None:

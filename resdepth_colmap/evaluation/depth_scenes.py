@@ -1,13 +1,13 @@
 """The scenes that paths name: workspaces with truth, and scenes of Middlebury."""
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from resdepth_colmap.evaluation.depth_case import SceneSource
+from resdepth_colmap.evaluation.depth_case import CaseOptions, LazyCase, SceneSource
 from resdepth_colmap.evaluation.middlebury_scene import (
     is_middlebury_scene,
-    read_middlebury_case,
+    read_middlebury_cases,
 )
 from resdepth_colmap.evaluation.workspace_cases import (
     TRUTH_FOLDER,
@@ -43,8 +43,8 @@ def _is_scene(path: Path) -> bool:
     return (path / TRUTH_FOLDER).is_dir() or is_middlebury_scene(path)
 
 
-def _reader(path: Path):  # type: ignore[no-untyped-def] # one of two functions
-    return read_middlebury_case if is_middlebury_scene(path) else read_workspace_cases
+def _reader(path: Path) -> Callable[[Path, CaseOptions], Sequence[LazyCase]]:
+    return read_middlebury_cases if is_middlebury_scene(path) else read_workspace_cases
 
 
 def _names(folders: Sequence[Path]) -> list[str]:

@@ -6,12 +6,16 @@ image of a pair, against the second alone.
 
 import dataclasses
 import functools
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.evaluation.depth_case import CaseOptions, DepthCase, SceneSource
+from resdepth_colmap.evaluation.depth_case import (
+    CaseOptions,
+    DepthCase,
+    LazyCase,
+    SceneSource,
+)
 from resdepth_colmap.evaluation.eth3d_pairs import (
     NUM_PAIRS,
     PAIRS_NAME,
@@ -84,7 +88,7 @@ def eth3d_sources(root: Path, options: Eth3dOptions) -> tuple[SceneSource, ...]:
     path = options.pairs_file(root)
     listed = {} if path is None else read_pairs(path)
 
-    def read(name: str, wanted: CaseOptions) -> Iterator[DepthCase]:
+    def read(name: str, wanted: CaseOptions) -> list[LazyCase]:
         if name not in scenes:
             raise WorkspaceError(
                 f"{root}: no scene {name} in it; there are: {', '.join(scenes)} "
@@ -95,7 +99,7 @@ def eth3d_sources(root: Path, options: Eth3dOptions) -> tuple[SceneSource, ...]:
             pairs = named_pairs(path, listed[name], reader.indices)
         else:
             pairs = reader.pairs_by_rule(options.num_pairs)
-        return (reader.case(pair, wanted) for pair in pairs)
+        return [functools.partial(reader.case, pair, wanted) for pair in pairs]
 
     names = dict.fromkeys(options.scenes or scenes)
     return tuple(

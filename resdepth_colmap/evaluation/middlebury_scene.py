@@ -4,15 +4,16 @@ Middlebury Stereo Evaluation v3 (MiddEval3) and the 2014 data sets; Scharstein e
 GCPR 2014. Depth = baseline * f / (disparity + doffs), here in metres.
 """
 
+import functools
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.evaluation.depth_case import CaseOptions, DepthCase
+from resdepth_colmap.evaluation.depth_case import CaseOptions, DepthCase, LazyCase
 from resdepth_colmap.io.images import read_gray
 from resdepth_colmap.io.pfm import read_pfm
 from resdepth_colmap.matching.patch_match import MatchView
@@ -34,8 +35,13 @@ def is_middlebury_scene(path: Path) -> bool:
     return (path / CALIBRATION_NAME).is_file() and not (path / "sparse").is_dir()
 
 
-def read_middlebury_case(path: Path, options: CaseOptions) -> Iterator[DepthCase]:
-    """The one case of a scene as distributed: im0 against im1.
+def read_middlebury_cases(path: Path, options: CaseOptions) -> list[LazyCase]:
+    """The one case of a scene as distributed; see `read_middlebury_case`."""
+    return [functools.partial(read_middlebury_case, path, options)]
+
+
+def read_middlebury_case(path: Path, options: CaseOptions) -> DepthCase:
+    """Read a scene as distributed: im0 against im1.
 
     Args:
         path: Folder of the scene.
@@ -65,7 +71,7 @@ def read_middlebury_case(path: Path, options: CaseOptions) -> Iterator[DepthCase
         for gray, camera, pose in zip(images, ("cam0", "cam1"), poses, strict=True)
     ]
     near, far = options.stereo.depth_min, options.stereo.depth_max
-    yield DepthCase(
+    return DepthCase(
         name=IMAGE_NAMES[0],
         reference=views[0],
         sources=(views[1],),

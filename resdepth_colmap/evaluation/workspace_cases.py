@@ -1,13 +1,18 @@
 """Dense workspaces with `ground_truth/`: which of their views can be compared."""
 
-from collections.abc import Iterator
+import functools
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.evaluation.depth_case import CaseOptions, DepthCase, InitialDepth
+from resdepth_colmap.evaluation.depth_case import (
+    CaseOptions,
+    DepthCase,
+    InitialDepth,
+    LazyCase,
+)
 from resdepth_colmap.geometry.depth_range import depth_range
 from resdepth_colmap.geometry.pixels import index_K
 from resdepth_colmap.geometry.view_selection import choose_sources
@@ -28,7 +33,7 @@ _SEEN = 1  # 255 in the file; occluded pixels are grey
 _WAY_OUT = "data/README.md says what a workspace with truth holds"
 
 
-def read_workspace_cases(path: Path, options: CaseOptions) -> Iterator[DepthCase]:
+def read_workspace_cases(path: Path, options: CaseOptions) -> list[LazyCase]:
     """The views of a workspace whose true depth is known, with the maps that it has.
 
     A view starts from its fullest map; one without any is to be matched against the
@@ -47,8 +52,10 @@ def read_workspace_cases(path: Path, options: CaseOptions) -> Iterator[DepthCase
     names = _names_with_truth(workspace, scene)
     check_images(workspace, scene)
     images = ViewImages(workspace, IMAGE_CACHE_BYTES)
-    for name in names:
-        yield _case(workspace, scene, scene.index(name), images, options)
+    return [
+        functools.partial(_case, workspace, scene, scene.index(name), images, options)
+        for name in names
+    ]
 
 
 def _names_with_truth(workspace: Workspace, scene: Scene) -> list[str]:

@@ -52,7 +52,8 @@ def fill_cache(folder: Path, rendered: RenderedEth3d) -> None:
     wanted = CaseOptions(stereo=STEREO, num_sources=1)
     camera = rendered.camera(WIDTH_PX)
     (source,) = eth3d_sources(rendered.path.parent, options)
-    for case in source.read(wanted):
+    for load in source.read(wanted):
+        case = load()
         index = IMAGES.index(case.name.split()[0])
         name = cache_name(source.name, case.name, StereoBackend.CPU)
         views = (case.reference, *case.sources)
@@ -285,3 +286,11 @@ def test_colmap_without_cuda_is_one_line(
     result = evaluate(tmp_path, rendered.path.parent, "--stereo", "colmap")
     assert result.exit_code == 1
     assert "--stereo cpu" in result.stderr
+
+
+def test_there_are_no_maps_to_start_from(
+    tmp_path: Path, rendered: RenderedEth3d
+) -> None:
+    result = evaluate(tmp_path, rendered.path.parent, "--stereo", "existing")
+    assert result.exit_code == 1
+    assert "--stereo existing: the scenes have no depth maps" in result.stderr

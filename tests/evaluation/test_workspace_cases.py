@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import torch
 from planes import NAMES
 from stereo_pairs import (
     NUM_UNSEEN_COLUMNS,
@@ -13,42 +12,21 @@ from stereo_pairs import (
     TRUTH_NAME,
     write_stereo_pair,
 )
+from warped_cases import difference_when_warped
 from workspaces import plane_folder
 
 from resdepth_colmap.config import StereoConfig
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.evaluation.depth_case import (
-    CaseOptions,
-    DepthCase,
-    source_from_reference,
-)
+from resdepth_colmap.evaluation.depth_case import CaseOptions, DepthCase
 from resdepth_colmap.evaluation.workspace_cases import read_workspace_cases
-from resdepth_colmap.geometry.warp import warp_to_reference
 from resdepth_colmap.io.depth_map import write_depth_map
 
 OPTIONS = CaseOptions(stereo=StereoConfig(max_num_sources=3), num_sources=1)
 
 
 def read_case(path: Path) -> DepthCase:
-    (case,) = read_workspace_cases(path, OPTIONS)
-    return case
-
-
-def difference_when_warped(case: DepthCase) -> float:
-    """Mean difference of the grey values where both views see the surface."""
-    known = case.truth > 0
-    inverse_depth = 1 / np.where(known, case.truth, 1)
-    source = case.sources[0]
-    warped, inside = warp_to_reference(
-        torch.from_numpy(source.gray.astype(np.float64))[None, None],
-        torch.from_numpy(inverse_depth.astype(np.float64))[None, None],
-        torch.from_numpy(case.reference.K)[None],
-        torch.from_numpy(source.K)[None],
-        torch.from_numpy(source_from_reference(case, source))[None],
-    )
-    counted = known & inside[0, 0].numpy()
-    difference = np.abs(warped[0, 0].numpy() - case.reference.gray)[counted]
-    return float(difference.mean())
+    (load,) = read_workspace_cases(path, OPTIONS)
+    return load()
 
 
 def test_what_is_written_is_read(tmp_path: Path) -> None:
