@@ -12,9 +12,8 @@ ASSETS = "assets"
 TEMPLATE = "report.html"
 NOTICE = "vendor/NOTICE.txt"
 STYLES = ("vendor/uPlot.min.css", "report.css")
+LIBRARIES = ("vendor/three.min.js", "vendor/uPlot.iife.min.js")
 SCRIPTS = (
-    "vendor/three.min.js",
-    "vendor/uPlot.iife.min.js",
     "elements.js",
     "blocks.js",
     "maps.js",
@@ -46,7 +45,8 @@ def render_page(title: str, data: Mapping[str, Any], blocks: Blocks) -> str:
         data=safe_json(data),
         notice=html.escape(read_asset(NOTICE)),
         blocks="\n".join(_block(name, content) for name, content in blocks.items()),
-        scripts="\n".join(f"<script>\n{read_asset(n)}</script>" for n in SCRIPTS),
+        libraries="\n".join(f"<script>{read_asset(n)}</script>" for n in LIBRARIES),
+        scripts="\n".join(read_asset(name) for name in SCRIPTS),
     )
 
 

@@ -1,4 +1,3 @@
-"use strict";
 // Binary data lies as base64 in script elements and is decoded when it is looked at.
 // PNG files are decoded here, not by a canvas: some browsers add noise to canvases.
 

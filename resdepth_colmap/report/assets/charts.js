@@ -1,4 +1,3 @@
-"use strict";
 // Histograms before and after, by uPlot.
 
 const charts = new Map();

@@ -1,4 +1,3 @@
-"use strict";
 // The fused cloud in 3D, before and after, by three.js. Drawn when something changes.
 
 const TURN = 0.08; // radians a key press

@@ -1,4 +1,3 @@
-"use strict";
 // The data; elements and numbers as people read them. All text goes in as text, never as
 // HTML.
 

@@ -1,4 +1,3 @@
-"use strict";
 // The strip of all images: each picture is decoded when it comes into sight.
 
 const LEAST_TO_FIND = 12;

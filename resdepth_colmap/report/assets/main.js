@@ -1,4 +1,3 @@
-"use strict";
 // Light or dark, and the start of everything.
 
 const THEME_KEY = "resdepth-report-theme";

@@ -1,4 +1,3 @@
-"use strict";
 // The maps of an image: decoded, as numbers; and drawn, as colours.
 
 const colorTables = new Map();

@@ -1,4 +1,3 @@
-"use strict";
 // The picture of one image: what is shown, the slider, and the pixel that is read.
 
 const MODES = {

@@ -1,4 +1,3 @@
-"use strict";
 // The head of the page, and the details at its end.
 
 const STAGE_COLORS = ["#4c78a8", "#0b7a75", "#b7791f", "#e2b96b", "#8b6bb1", "#9aa1ab", "#c4576b"];

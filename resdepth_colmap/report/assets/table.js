@@ -1,4 +1,3 @@
-"use strict";
 // The table of all images, sorted by any column.
 
 const COLUMNS = [
