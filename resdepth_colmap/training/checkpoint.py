@@ -42,12 +42,14 @@ class Position:
         loss_sum: Sum of their losses since the last line of the log.
         loss_count: Number of these.
         best_score: Least score of a validation so far; infinite before the first.
+        samples_key: Tells the samples that the steps were taken with from others.
     """
 
     step: int = 0
     loss_sum: float = 0.0
     loss_count: int = 0
     best_score: float = math.inf
+    samples_key: str = ""
 
 
 def save_state(output: Path, run: Optimisation, position: Position) -> None:

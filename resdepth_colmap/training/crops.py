@@ -2,6 +2,7 @@
 
 import dataclasses
 import functools
+import hashlib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -114,6 +115,12 @@ class CropSampler:
             weight=weight.clamp(*NEAR_TRUTH_WEIGHT),
             names=tuple(path.stem for path, _ in draws),
         )
+
+    @property
+    def samples_key(self) -> str:
+        """Tells these samples from others: a hash of their names."""
+        names = "\n".join(path.stem for path in self.paths)
+        return hashlib.sha256(names.encode()).hexdigest()[:16]
 
     @functools.cached_property
     def _pools(self) -> tuple[tuple[Path, ...], tuple[Path, ...]]:

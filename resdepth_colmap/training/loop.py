@@ -1,6 +1,7 @@
 """The training loop: seeded, resumable, stopped by a loss that is not a number."""
 
 import collections
+import logging
 import math
 import time
 from collections.abc import Iterator, Sequence
@@ -32,6 +33,8 @@ from resdepth_colmap.training.stop_request import StopRequest, stop_request
 from resdepth_colmap.training.train_config import TrainConfig
 from resdepth_colmap.training.training_log import Row, TrainingLog
 from resdepth_colmap.training.validation import mean_loss
+
+logger = logging.getLogger(__name__)
 
 CURVES_NAME = "curves.png"
 PREDICTIONS_FOLDER = "predictions"
@@ -102,6 +105,7 @@ class _Loop:
         self.output = output
         self.stop = stop
         self.position = load_state(output, optimisation)
+        self._check_samples()
         self.log: TrainingLog | None = None
 
     def run(self, advance: Advance) -> None:
@@ -118,6 +122,16 @@ class _Loop:
         finally:
             if self.log is not None:
                 self.log.close()
+
+    def _check_samples(self) -> None:
+        key, before = self.data.training.samples_key, self.position.samples_key
+        if before and before != key and self.ranks.is_first:
+            logger.warning(
+                "%s: the samples are not those of before, so that the steps from here "
+                "on are not those of a training without a stop.",
+                self.output,
+            )
+        self.position.samples_key = key
 
     def _run(self, advance: Advance) -> None:
         start = time.perf_counter()

@@ -125,6 +125,21 @@ def test_other_options_are_refused_by_name_and_harmless_ones_are_not(
     assert train([workspace], output, NETWORK, harmless).is_file()
 
 
+def test_other_samples_than_before_are_told(
+    workspace: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    output = tmp_path / "run"
+    train([workspace], output, NETWORK, TRAINING)
+    assert not caplog.records
+    train([workspace], output, NETWORK, TRAINING)
+    assert not caplog.records
+    other = write_noisy_plane(tmp_path / "other")
+    one_sided = dataclasses.replace(TRAINING, validation_share=0.0)
+    train([workspace], tmp_path / "second", NETWORK, one_sided)
+    train([workspace, other], tmp_path / "second", NETWORK, one_sided)
+    assert "not those of before" in caplog.text
+
+
 def test_a_broken_state_names_itself(workspace: Path, tmp_path: Path) -> None:
     (tmp_path / "state.pt").write_bytes(b"half a file")
     with pytest.raises(TrainingError, match=r"state\.pt: not a readable state"):

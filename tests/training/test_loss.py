@@ -1,0 +1,107 @@
+"""Laws of the loss."""
+
+import dataclasses
+
+import pytest
+import torch
+from torch import Tensor
+
+from resdepth_colmap.network.unet import Refinement
+from resdepth_colmap.training.crops import Batch
+from resdepth_colmap.training.loss import refinement_loss
+from resdepth_colmap.training.train_config import Preset, TrainConfig
+
+SHAPE = (2, 1, 6, 8)
+DEFAULT, PAPER = TrainConfig(), TrainConfig.of(Preset.PAPER)
+
+
+def random(seed: int) -> Tensor:
+    return torch.randn(SHAPE, generator=torch.Generator().manual_seed(seed))
+
+
+@pytest.fixture
+def batch() -> Batch:
+    return Batch(
+        inputs=torch.zeros(SHAPE),
+        target=random(0),
+        known=random(1) > 0,
+        weight=random(2).abs() + 0.3,
+        names=("a", "b"),
+    )
+
+
+def refined_of(depth: Tensor, log_scale: Tensor | None = None) -> Refinement:
+    return Refinement(depth, log_scale)
+
+
+def test_the_papers_loss_is_the_mean_absolute_error(batch: Batch) -> None:
+    batch = batch._replace(weight=torch.ones(SHAPE))
+    depth = random(3)
+    total, num_known = refinement_loss(refined_of(depth, random(4)), batch, PAPER)
+    expected = (depth - batch.target).abs()[batch.known].mean()
+    torch.testing.assert_close(total / num_known, expected)
+
+
+def test_the_truth_itself_costs_nothing(batch: Batch) -> None:
+    assert refinement_loss(refined_of(batch.target), batch, DEFAULT).total == 0
+
+
+@pytest.mark.parametrize("config", [DEFAULT, PAPER])
+def test_what_is_not_known_does_not_matter(batch: Batch, config: TrainConfig) -> None:
+    depth, log_scale = random(3), random(4)
+    loss = refinement_loss(refined_of(depth, log_scale), batch, config)
+    other = batch._replace(target=torch.where(batch.known, batch.target, torch.nan))
+    elsewhere = torch.where(batch.known, depth, depth + 5)
+    again = refinement_loss(refined_of(elsewhere, log_scale), other, config)
+    torch.testing.assert_close(again.total, loss.total)
+    assert again.num_known == loss.num_known == batch.known.sum()
+
+
+def test_a_batch_without_truth_has_no_loss_and_no_gradient(batch: Batch) -> None:
+    depth = random(3).requires_grad_()
+    nothing = batch._replace(known=torch.zeros(SHAPE, dtype=torch.bool))
+    loss = refinement_loss(refined_of(depth), nothing, DEFAULT)
+    loss.total.backward()  # type: ignore[no-untyped-call] # torch's own
+    assert loss.total == loss.num_known == 0
+    assert depth.grad is not None
+    assert (depth.grad == 0).all()
+
+
+def test_the_confidence_does_not_pull_at_the_depth(batch: Batch) -> None:
+    gradients = []
+    for log_scale in (random(4), random(5)):
+        depth = random(3).requires_grad_()
+        loss = refinement_loss(refined_of(depth, log_scale), batch, DEFAULT)
+        loss.total.backward()  # type: ignore[no-untyped-call] # torch's own
+        gradients.append(depth.grad)
+    assert gradients[0] is not None
+    torch.testing.assert_close(gradients[0], gradients[1])
+
+
+def test_the_best_scale_is_the_error(batch: Batch) -> None:
+    batch = batch._replace(target=torch.zeros(SHAPE))
+    depth = torch.full(SHAPE, 0.5)
+    losses = {
+        scale: float(
+            refinement_loss(
+                refined_of(depth, torch.full(SHAPE, scale).log()), batch, DEFAULT
+            ).total
+        )
+        for scale in (0.25, 0.4, 0.5, 0.6, 1.0)
+    }
+    assert min(losses, key=lambda scale: losses[scale]) == 0.5
+
+
+def test_the_logarithm_weighs_small_errors_more(batch: Batch) -> None:
+    """Halving a small error gains more, by its size, than halving a large one."""
+    plain = dataclasses.replace(DEFAULT, log_weight=0.0)
+
+    def gain(error: float, config: TrainConfig) -> float:
+        whole, half = (
+            float(refinement_loss(refined_of(batch.target + e), batch, config).total)
+            for e in (error, error / 2)
+        )
+        return (whole - half) / error
+
+    assert gain(0.02, plain) == pytest.approx(gain(2.0, plain), rel=1e-2)
+    assert gain(0.02, DEFAULT) > 2 * gain(2.0, DEFAULT)
