@@ -21,7 +21,7 @@ from resdepth_colmap.training.ranks import Ranks, join_ranks
 from resdepth_colmap.training.samples import prepare_samples
 
 NETWORK = NetworkConfig(levels=2, base_channels=4, max_channels=8)
-TIMEOUT_S = 120
+TIMEOUT_S = 400
 
 
 @pytest.fixture
