@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from resdepth_colmap.config import RefineConfig, StereoBackend, StereoConfig
-from resdepth_colmap.errors import WorkspaceError
+from resdepth_colmap.errors import ResDepthError, WorkspaceError
 from resdepth_colmap.evaluation.case_matching import initial_depth, matching_backend
 from resdepth_colmap.evaluation.depth_arms import CaseResult, measure_case
 from resdepth_colmap.evaluation.depth_case import CaseOptions, DepthCase, SceneSource
@@ -51,12 +51,10 @@ class Listener:
     """Who is told while the comparison runs.
 
     Attributes:
-        on_scene: Told of each scene as it is done.
         on_failure: Told the name of a scene that is broken, and what is wrong.
         progress: Shows one stage of all scenes.
     """
 
-    on_scene: Callable[[SceneResult], None] | None = None
     on_failure: Callable[[str, str], None] | None = None
     progress: Progress = dataclasses.field(default_factory=SilentProgress)
 
@@ -91,14 +89,12 @@ def evaluate_scenes(
         for source in sources:
             try:
                 result = _measure_scene(source, network, options, backend, advance)
-            except WorkspaceError as error:
+            except ResDepthError as error:  # also a matcher that failed on it
                 failed[source.name] = " ".join(str(error).split())
                 if listener.on_failure:
                     listener.on_failure(source.name, failed[source.name])
             else:
                 results.append(result)
-                if listener.on_scene:
-                    listener.on_scene(result)
     return DepthReport(
         date=datetime.datetime.now(datetime.UTC).date(),
         weights_sha256=weights_hash(options.refine.weights),
@@ -126,6 +122,8 @@ def _measure_scene(
         initial = initial_depth(
             source.name, case, backend, options.stereo, options.cache
         )
+        if not (initial.depth > 0).any():
+            raise WorkspaceError(f"{case.name}: no pixel has an initial depth.")
         return measure_case(
             case, initial, network, options.refine, options.max_residual
         )

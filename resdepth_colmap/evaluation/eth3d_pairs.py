@@ -23,6 +23,8 @@ PAIRS_NAME = "pairs.txt"
 NUM_PAIRS = 4
 """Pairs of a scene of which the paper does not say how many it has."""
 
+_NUM_CANDIDATES = 10  # sources of a reference that are looked at
+
 LEAST_OVERLAP = 0.6
 """Share of the reference that the source sees, at the middle of its depths."""
 
@@ -44,10 +46,10 @@ def choose_pairs(
 ) -> tuple[Pair, ...]:
     """The pairs with the most shared points, at a reasonable angle, no view twice.
 
-    Each reference is paired with its best source (`choose_sources`). A pair counts if
-    the source sees 60 % of the reference and the rays meet at 2 to 15 degrees. Those
-    with the most shared points are taken; where no view is left that is in no pair
-    yet, a view may be in two.
+    Each reference is paired with the best of its sources (`choose_sources`) that see
+    60 % of it and whose rays meet its own at 2 to 15 degrees. The pairs with the most
+    shared points are taken; where no view is left that is in none yet, a view may be
+    in two.
 
     Args:
         scene: The views and their statistics.
@@ -59,9 +61,10 @@ def choose_pairs(
     """
     found = []
     for reference in sorted(references):
-        for choice in choose_sources(scene, reference, 1):
-            if _is_good(scene, reference, choice):
-                found.append((choice.num_shared_points, reference, choice.index))
+        choices = choose_sources(scene, reference, _NUM_CANDIDATES)
+        good = [it for it in choices if _is_good(scene, reference, it)]
+        if good:
+            found.append((good[0].num_shared_points, reference, good[0].index))
     ranked = [Pair(r, s) for _, r, s in sorted(found, key=lambda it: (-it[0], it[1]))]
     taken: list[Pair] = []
     for pair in ranked:

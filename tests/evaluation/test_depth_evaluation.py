@@ -16,6 +16,7 @@ from stereo_pairs import (
 from workspaces import identity_weights, plane_folder
 
 from resdepth_colmap.config import RefineConfig, StereoConfig
+from resdepth_colmap.errors import BackendUnavailableError
 from resdepth_colmap.evaluation import case_matching
 from resdepth_colmap.evaluation.depth_case import InitialDepth
 from resdepth_colmap.evaluation.depth_evaluation import (
@@ -171,6 +172,27 @@ def test_a_broken_scene_stops_no_other(tmp_path: Path) -> None:
     assert "19208 bytes, but the file has 19207" in report.failed["C"]
     overall = report.to_mapping()["overall"]["unfiltered"]
     assert overall["num_pixels"] == 2 * 59 * 80
+
+
+def test_a_matcher_that_fails_or_finds_nothing_is_a_broken_scene(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("A", "B", "C"):
+        write_stereo_pair(tmp_path / "scenes" / name)
+    depth = np.ones((60, 80), np.float32)
+
+    def find(scene: str, *_: object) -> InitialDepth:
+        if scene == "A":
+            raise BackendUnavailableError("out of memory")
+        return InitialDepth(depth=depth * (scene == "C"), origin="the test")
+
+    monkeypatch.setattr(
+        "resdepth_colmap.evaluation.depth_evaluation.initial_depth", find
+    )
+    report = evaluated(tmp_path, tmp_path / "scenes")
+    assert [scene.name for scene in report.scenes] == ["C"]
+    assert report.failed["A"] == "out of memory"
+    assert report.failed["B"] == "im0.png: no pixel has an initial depth."
 
 
 def test_scenes_of_one_name_are_told_apart(tmp_path: Path) -> None:

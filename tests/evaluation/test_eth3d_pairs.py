@@ -1,10 +1,13 @@
 """Laws of choosing stereo pairs."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from analytic_scene import CAMERA, view_at
 
 from resdepth_colmap.evaluation.eth3d_pairs import Pair, choose_pairs
+from resdepth_colmap.geometry.view_selection import choose_sources
 from resdepth_colmap.scene import Scene
 
 NUM_VIEWS = 6
@@ -54,6 +57,16 @@ def test_an_unreasonable_baseline_is_no_pair(angle_deg: float) -> None:
     # At 1 degree a view further away is at a reasonable angle; at 16 none is.
     assert all(abs(pair.reference - pair.source) > 1 for pair in chosen)
     assert bool(chosen) == (angle_deg == 1.0)
+
+
+def test_the_next_best_source_serves_where_the_best_is_unreasonable() -> None:
+    scene = row_of_views(0.4)
+    indices = np.arange(NUM_VIEWS)
+    is_next = np.abs(indices[:, None] - indices) == 1
+    angles = np.where(is_next, 17.0, 8.0)  # neighbours still score highest
+    wide = dataclasses.replace(scene, triangulation_angle_deg=angles)
+    assert choose_sources(wide, 0, 1)[0].index == 1
+    assert choose_pairs(wide, [0], 1) == (Pair(0, 2),)
 
 
 def test_without_points_the_poses_decide() -> None:
