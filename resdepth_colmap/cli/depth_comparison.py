@@ -17,16 +17,20 @@ if TYPE_CHECKING:
     from resdepth_colmap.evaluation.depth_evaluation import EvaluationOptions
     from resdepth_colmap.evaluation.tables import Measured
 
-MATCHER_OPTIONS = (
-    "window_radius",
-    "window_step",
-    "sigma_color",
-    "num_iterations",
-    "depth_min",
-    "depth_max",
-    "seed",
+NO_MATCHER_OPTIONS = (
+    "max_image_size",
+    "min_triangulation_angle",
+    "geom_consistency",
+    "filter",
+    "filter_min_ncc",
+    "filter_min_triangulation_angle",
+    "filter_min_num_consistent",
+    "filter_geom_consistency_max_cost",
+    "write_consistency_graph",
+    "mask_path",
+    "cache_size",
 )
-"""Those of StereoConfig that an unfiltered map of one pass depends on."""
+"""Those of StereoConfig that an unfiltered map of full size does not depend on."""
 
 max_residual_option = click.option(
     "--max-residual",

@@ -6,7 +6,7 @@ from typing import Any
 import click
 
 from resdepth_colmap.cli.depth_comparison import (
-    MATCHER_OPTIONS,
+    NO_MATCHER_OPTIONS,
     evaluation_options,
     max_residual_option,
     report_options,
@@ -29,7 +29,7 @@ from resdepth_colmap.config import RefineConfig, StereoBackend, StereoConfig
     type=click.Path(path_type=Path),
 )
 @config_options(RefineConfig, "passes", "keep_confirmed", "weights", "device")
-@config_options(StereoConfig, *MATCHER_OPTIONS, "max_num_sources")
+@config_options(StereoConfig, skip=NO_MATCHER_OPTIONS)
 @max_residual_option
 @click.option(
     "--cache",

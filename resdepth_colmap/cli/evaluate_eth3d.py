@@ -6,7 +6,7 @@ from typing import Any
 import click
 
 from resdepth_colmap.cli.depth_comparison import (
-    MATCHER_OPTIONS,
+    NO_MATCHER_OPTIONS,
     evaluation_options,
     max_residual_option,
     report_options,
@@ -61,7 +61,7 @@ CACHE_NAME = "resdepth-cache"
     text="Whose PatchMatch: COLMAP's (needs CUDA), or ours on the CPU.",
 )
 @config_options(RefineConfig, "passes", "keep_confirmed", "weights", "device")
-@config_options(StereoConfig, *MATCHER_OPTIONS)
+@config_options(StereoConfig, skip=(*NO_MATCHER_OPTIONS, "max_num_sources"))
 @max_residual_option
 @click.option(
     "--cache",
