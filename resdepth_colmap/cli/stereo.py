@@ -19,7 +19,8 @@ from resdepth_colmap.config import StereoBackend, StereoConfig
 @command(
     "Make initial depth maps by PatchMatch.",
     "stereo scene/dense --max-image-size 1000",
-    "stereo scene/dense --PatchMatchStereo.window_radius 7",
+    "stereo scene/dense --no-filter --mask-path scene/masks",
+    "stereo scene/dense --PatchMatchStereo.geom_consistency 0",
 )
 @workspace_argument
 @enum_option(
@@ -34,10 +35,13 @@ from resdepth_colmap.config import StereoBackend, StereoConfig
 def stereo(
     workspace: Path, backend: StereoBackend, overwrite: bool, **values: Any
 ) -> None:
-    """Make the photometric depth and normal maps that WORKSPACE lacks.
+    """Make the depth and normal maps that WORKSPACE lacks: COLMAP's patch_match_stereo.
 
-    They go to WORKSPACE/stereo, in COLMAP's format. The options have COLMAP's names and
-    are taken in its spelling too. Maps that are there are kept.
+    They go to WORKSPACE/stereo, in COLMAP's format, and `colmap stereo_fusion` takes
+    them: photometric ones with a depth at each pixel, then geometric ones, which are
+    matched against the neighbours' depth, too, and filtered. The options have COLMAP's
+    names and meanings, and are taken in its spelling too. Maps that are there are kept;
+    what was interrupted goes on.
     """
     config = build_config(StereoConfig, values)
     from resdepth_colmap.cli.log import BarProgress

@@ -5,27 +5,21 @@ import logging
 
 from resdepth_colmap.config import StereoBackend, StereoConfig
 from resdepth_colmap.errors import BackendUnavailableError, WorkspaceError
-from resdepth_colmap.geometry.depth_range import depth_range
-from resdepth_colmap.geometry.pixels import index_K
-from resdepth_colmap.geometry.view_selection import choose_sources
-from resdepth_colmap.io.depth_map import write_depth_map
-from resdepth_colmap.io.normal_map import write_normal_map
-from resdepth_colmap.io.patch_match_cfg import SourceKind, SourceSpec, read_sources
+from resdepth_colmap.io.masks import check_masks
 from resdepth_colmap.io.workspace import Workspace
-from resdepth_colmap.matching.patch_match import MatchResult, MatchView, match_view
-from resdepth_colmap.pipeline.progress import Advance, Progress, SilentProgress
-from resdepth_colmap.pipeline.stereo_ledger import (
-    KIND,
-    UNFINISHED,
-    StereoLedger,
-    stereo_fingerprint,
+from resdepth_colmap.pipeline.progress import Progress, SilentProgress
+from resdepth_colmap.pipeline.stereo_colmap import run_colmap
+from resdepth_colmap.pipeline.stereo_ledger import Fingerprints, StereoLedger
+from resdepth_colmap.pipeline.stereo_passes import (
+    StereoPass,
+    ViewMatcher,
+    passes_of,
 )
-from resdepth_colmap.pipeline.view_images import ViewImages, camera_at_scale
-from resdepth_colmap.scene import Scene, View
+from resdepth_colmap.pipeline.stereo_plan import StereoPlan, plan_stereo
+from resdepth_colmap.pipeline.stereo_warm_up import warm_up
+from resdepth_colmap.scene import Scene
 
 logger = logging.getLogger(__name__)
-
-AUTO_SOURCES = 20  # COLMAP's default in patch-match.cfg
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -92,10 +86,12 @@ def stereo_workspace(
     overwrite: bool = False,
     progress: Progress | None = None,
 ) -> StereoReport:
-    """Make the photometric depth and normal maps that a workspace lacks.
+    """Make the depth and normal maps that a workspace lacks, in COLMAP's two passes.
 
-    Maps of others are never replaced unless `overwrite` says so; our own are made anew
-    when an option or an input changed.
+    The photometric ones are whole; the geometric ones, which are matched against the
+    depth of the sources, too, are filtered, unless the options say otherwise. Maps of
+    others are never replaced unless `overwrite` says so; our own are made anew when an
+    option or an input changed.
 
     Raises:
         WorkspaceError: If an image cannot be read, or nothing could be matched.
@@ -113,15 +109,7 @@ def stereo_workspace(
 def _run_colmap(
     workspace: Workspace, scene: Scene, config: StereoConfig
 ) -> StereoReport:
-    import pycolmap
-
-    options = pycolmap.PatchMatchOptions()
-    options.max_image_size = config.max_image_size
-    options.window_radius = config.window_radius
-    options.sigma_color = config.sigma_color
-    options.depth_min = config.depth_min
-    options.depth_max = config.depth_max
-    pycolmap.patch_match_stereo(str(workspace.path), options=options)
+    run_colmap(workspace, scene, config)
     names = tuple(view.name for view in scene.views)
     return StereoReport(backend=StereoBackend.COLMAP, matched=names)
 
@@ -133,126 +121,77 @@ def _run_cpu(
     overwrite: bool,
     progress: Progress,
 ) -> StereoReport:
-    plans, skipped = plan_sources(workspace, scene, config)
+    _check_masks(scene, config)
+    plans, skipped = plan_stereo(workspace, scene, config)
     ledger = StereoLedger(workspace)
-    pending, kept = [], []
-    for index, sources in plans.items():
-        view = scene.views[index]
-        fingerprint = stereo_fingerprint(workspace, scene, index, sources, config)
-        if not overwrite and ledger.is_kept(view.name, fingerprint):
-            kept.append(view.name)
-        else:
-            pending.append((index, sources, fingerprint))
+    fingerprints = Fingerprints(scene, plans, config, ledger)
+    pending = _pending(plans, fingerprints, passes_of(config), overwrite)
     if pending:
-        logger.info("Compiling the matcher: up to a minute, once on a machine.")
-    matched = []
-    # A view with its sources, and as many that the next view may share.
-    images = ViewImages(workspace, 2 * (1 + config.max_num_sources))
+        warm_up(config)
+    matcher = ViewMatcher(workspace, scene, config, ledger)
+    matched: dict[str, None] = {}
+    failed: dict[str, str] = {}
     ledger.start()
-    with progress.stage("PatchMatch", len(pending)) as advance:
-        for index, sources, fingerprint in pending:
-            view = scene.views[index]
-            result = _match(scene, index, sources, config, images, advance)
-            ledger.add(view.name, UNFINISHED)
-            write_depth_map(workspace.depth_map_path(view.name, KIND), result.depth)
-            write_normal_map(workspace.normal_map_path(view.name, KIND), result.normals)
-            ledger.add(view.name, fingerprint)
-            matched.append(view.name)
+    num_units = sum(which.num_units for which, _ in pending)
+    with progress.stage("PatchMatch", num_units) as advance:
+        for which, plan in pending:
+            name = scene.views[plan.index].name
+            reason = matcher.match(plan, which, advance)
+            if reason:
+                logger.warning("%s is skipped: %s.", name, reason)
+                failed[name] = reason
+                continue
+            ledger.add(name, which.kind, fingerprints.of(plan, which.kind))
+            matched[name] = None
     ledger.finish()
-    if not matched and not kept:
+    names = [scene.views[plan.index].name for plan in plans]
+    report = StereoReport(
+        backend=StereoBackend.CPU,
+        matched=tuple(n for n in matched if n not in failed),
+        kept=tuple(n for n in names if n not in matched and n not in failed),
+        skipped=(*skipped, *failed.items()),
+    )
+    _check_any(workspace, report)
+    return report
+
+
+def _pending(
+    plans: tuple[StereoPlan, ...],
+    fingerprints: Fingerprints,
+    passes: tuple[StereoPass, ...],
+    overwrite: bool,
+) -> list[tuple[StereoPass, StereoPlan]]:
+    """What is to be done, in order: first passes only where a last one needs them."""
+    *first, last = passes
+    ours = [p for p in plans if overwrite or not fingerprints.are_kept(p, last.kind)]
+    needed = {index for plan in ours for index in (plan.index, *plan.sources)}
+    return [
+        (which, plan)
+        for which in first
+        for plan in plans
+        if plan.index in needed
+        and (overwrite or not fingerprints.are_kept(plan, which.kind))
+    ] + [(last, plan) for plan in ours]
+
+
+def _check_masks(scene: Scene, config: StereoConfig) -> None:
+    if config.mask_path is None:
+        return
+    cameras = {view.name: view.camera for view in scene.views}
+    num_masks = check_masks(config.mask_path, cameras)
+    if num_masks < len(cameras):
+        logger.warning(
+            "%s: masks for %d of %d images (<image name>.png).",
+            config.mask_path,
+            num_masks,
+            len(cameras),
+        )
+
+
+def _check_any(workspace: Workspace, report: StereoReport) -> None:
+    if not report.matched and not report.kept:
         raise WorkspaceError(
             f"{workspace.path}: no view could be matched: "
-            + "; ".join(f"{name}: {reason}" for name, reason in skipped[:3])
+            + "; ".join(f"{name}: {reason}" for name, reason in report.skipped[:3])
+            + "."
         )
-    return StereoReport(
-        backend=StereoBackend.CPU,
-        matched=tuple(matched),
-        kept=tuple(kept),
-        skipped=tuple(skipped),
-    )
-
-
-def plan_sources(
-    workspace: Workspace, scene: Scene, config: StereoConfig
-) -> tuple[dict[int, tuple[int, ...]], list[tuple[str, str]]]:
-    """Which views each reference view is matched against, as patch-match.cfg says.
-
-    Without that file every view is matched against automatically chosen ones.
-
-    Returns:
-        Indices of the sources by index of the reference; and name and reason of each
-        view that cannot be matched.
-    """
-    path = workspace.stereo_path / "patch-match.cfg"
-    specs = read_sources(path) if path.exists() else _automatic(scene)
-    plans: dict[int, tuple[int, ...]] = {}
-    skipped = []
-    for name, spec in specs.items():
-        index = scene.index(name)
-        if index < 0:
-            skipped.append((name, f"{path.name} names it, but the model does not"))
-            continue
-        sources = _sources_of(scene, index, spec, config)
-        if sources:
-            plans[index] = sources
-        else:
-            skipped.append((name, "no other view overlaps with it"))
-    for name, reason in skipped:
-        logger.warning("%s is skipped: %s.", name, reason)
-    return plans, skipped
-
-
-def _automatic(scene: Scene) -> dict[str, SourceSpec]:
-    return {
-        view.name: SourceSpec(kind=SourceKind.AUTO, num_auto=AUTO_SOURCES)
-        for view in scene.views
-    }
-
-
-def _sources_of(
-    scene: Scene, index: int, spec: SourceSpec, config: StereoConfig
-) -> tuple[int, ...]:
-    limit = config.max_num_sources
-    if spec.kind is SourceKind.EXPLICIT:
-        named = (scene.index(name) for name in spec.names)
-        return tuple(other for other in named if other not in (-1, index))[:limit]
-    if spec.kind is SourceKind.AUTO:
-        limit = min(limit, spec.num_auto)
-    return tuple(choice.index for choice in choose_sources(scene, index, limit))
-
-
-def _match(
-    scene: Scene,
-    index: int,
-    sources: tuple[int, ...],
-    config: StereoConfig,
-    images: ViewImages,
-    advance: Advance,
-) -> MatchResult:
-    near, far = config.depth_min, config.depth_max
-    if near <= 0:
-        near, far = depth_range(scene, index, sources)
-    reference, *others = (
-        _match_view(scene.views[i], images, config.max_image_size)
-        for i in (index, *sources)
-    )
-    return match_view(
-        reference,
-        others,
-        (near, far),
-        config,
-        on_sweep=lambda _, total: advance(1.0 / total),
-    )
-
-
-def _match_view(view: View, images: ViewImages, max_image_size: int) -> MatchView:
-    """What the matcher takes of a view, at matching size."""
-    longest_px = max(view.camera.width_px, view.camera.height_px)
-    is_smaller = 0 < max_image_size < longest_px
-    scale = max_image_size / longest_px if is_smaller else 1.0
-    camera = camera_at_scale(view.camera, scale)
-    return MatchView(
-        gray=images.gray(view, camera),
-        K=index_K(camera),
-        cam_from_world=view.cam_from_world,
-    )

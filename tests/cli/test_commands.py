@@ -161,7 +161,7 @@ def test_quiet_stands_before_or_after_the_command(tmp_path: Path) -> None:
 
 
 def test_stereo_keeps_maps_that_are_there(tmp_path: Path) -> None:
-    folder = plane_folder(tmp_path, kinds=("photometric",))
+    folder = plane_folder(tmp_path, kinds=("photometric", "geometric"))
     path = folder / "stereo/depth_maps/3.png.photometric.bin"
     before = path.stat().st_mtime_ns
     text = run("stereo", folder).stdout

@@ -1,0 +1,136 @@
+"""Which views each view is matched against, and between which depths."""
+
+import dataclasses
+import logging
+
+from resdepth_colmap.config import StereoConfig
+from resdepth_colmap.geometry.depth_range import depth_range
+from resdepth_colmap.geometry.view_selection import choose_sources
+from resdepth_colmap.io.patch_match_cfg import SourceKind, SourceSpec, read_sources
+from resdepth_colmap.io.workspace import Workspace
+from resdepth_colmap.scene import Scene
+
+logger = logging.getLogger(__name__)
+
+AUTO_SOURCES = 20  # COLMAP's default in patch-match.cfg
+MOST_NAMES_SHOWN = 3
+
+Skipped = tuple[tuple[str, str], ...]
+"""Name and reason of each image that is not matched."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class StereoPlan:
+    """What a view is matched against.
+
+    Attributes:
+        index: Its place in the scene.
+        sources: Places of its sources, at least one.
+        depth_range: Near and far depth, in workspace units, 0 < near < far.
+        is_guess: Whether nothing but the poses tells the depth range.
+    """
+
+    index: int
+    sources: tuple[int, ...]
+    depth_range: tuple[float, float]
+    is_guess: bool = False
+
+
+def plan_stereo(
+    workspace: Workspace, scene: Scene, config: StereoConfig
+) -> tuple[tuple[StereoPlan, ...], Skipped]:
+    """Decide what each view is matched against, as patch-match.cfg says.
+
+    Without that file every view is matched against automatically chosen ones. Views
+    that cannot be matched are said and left out.
+
+    Raises:
+        WorkspaceError: If patch-match.cfg is malformed.
+    """
+    path = workspace.stereo_path / "patch-match.cfg"
+    specs = read_sources(path) if path.exists() else _automatic(scene)
+    plans, skipped = [], []
+    for name, spec in specs.items():
+        index = scene.index(name)
+        if index < 0:
+            skipped.append((name, f"{path.name} names it, but the model does not"))
+            continue
+        sources = _sources_of(scene, index, spec, config)
+        if not sources:
+            skipped.append((name, "no other view overlaps with it"))
+            continue
+        try:
+            plans.append(_plan(scene, index, sources, config))
+        except ValueError as error:
+            skipped.append((name, str(error).removesuffix(".")))
+    for name, reason in skipped:
+        logger.warning("%s is skipped: %s.", name, reason)
+    _say_few_sources(scene, plans, config)
+    return tuple(plans), tuple(skipped)
+
+
+def _automatic(scene: Scene) -> dict[str, SourceSpec]:
+    return {
+        view.name: SourceSpec(kind=SourceKind.AUTO, num_auto=AUTO_SOURCES)
+        for view in scene.views
+    }
+
+
+def _sources_of(
+    scene: Scene, index: int, spec: SourceSpec, config: StereoConfig
+) -> tuple[int, ...]:
+    limit = config.max_num_sources
+    if spec.kind is SourceKind.EXPLICIT:
+        return _listed(scene, index, spec.names)[:limit]
+    choices = choose_sources(scene, index, len(scene.views))
+    if spec.kind is SourceKind.AUTO:
+        limit = min(limit, spec.num_auto)
+        # Without shared points there is no such angle, only one between the axes.
+        choices = tuple(
+            choice
+            for choice in choices
+            if not choice.num_shared_points
+            or choice.angle_deg >= config.min_triangulation_angle
+        )
+    return tuple(choice.index for choice in choices[:limit])
+
+
+def _listed(scene: Scene, index: int, names: tuple[str, ...]) -> tuple[int, ...]:
+    indices = {name: scene.index(name) for name in dict.fromkeys(names)}
+    for name, other in indices.items():
+        if other < 0:
+            logger.warning(
+                "%s: its source %s is left out: the model does not have it.",
+                scene.views[index].name,
+                name,
+            )
+    return tuple(other for other in indices.values() if other not in (-1, index))
+
+
+def _plan(
+    scene: Scene, index: int, sources: tuple[int, ...], config: StereoConfig
+) -> StereoPlan:
+    if config.depth_min > 0:
+        limits, is_guess = (config.depth_min, config.depth_max), False
+    else:
+        limits = depth_range(scene, index, sources)
+        is_guess = scene.depth_range is None or not scene.depth_range[index, 0] > 0
+    return StereoPlan(
+        index=index, sources=sources, depth_range=limits, is_guess=is_guess
+    )
+
+
+def _say_few_sources(
+    scene: Scene, plans: list[StereoPlan], config: StereoConfig
+) -> None:
+    needed = config.filter_min_num_consistent
+    few = [scene.views[p.index].name for p in plans if len(p.sources) < needed]
+    if config.filter and few:
+        logger.warning(
+            "%d views have fewer sources than filter_min_num_consistent=%d, so that "
+            "all of their sources have to agree on a depth: %s%s.",
+            len(few),
+            needed,
+            ", ".join(few[:MOST_NAMES_SHOWN]),
+            " ..." if len(few) > MOST_NAMES_SHOWN else "",
+        )
