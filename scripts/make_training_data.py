@@ -33,7 +33,7 @@ def make_room(output: Path, seed: int) -> str:
     workspace = open_workspace(path)
     scene = read_scene(workspace.sparse_path, workspace.images_path, workspace.path)
     report = stereo_workspace(
-        workspace, scene, StereoConfig(seed=seed), StereoBackend.CPU
+        workspace, scene, StereoConfig(seed=seed, filter=False), StereoBackend.CPU
     )
     return f"{path.name}: {len(report.matched)} matched, {len(report.kept)} kept"
 

@@ -1,5 +1,6 @@
 """The command `refine`: the whole road."""
 
+import dataclasses
 from pathlib import Path
 from typing import Any
 
@@ -66,7 +67,9 @@ def refine(
     """
     config = RunConfig(
         backend=backend,
-        stereo=build_config(StereoConfig, values),
+        stereo=dataclasses.replace(
+            RunConfig.stereo, max_image_size=values["max_image_size"]
+        ),
         refine=build_config(RefineConfig, values),
         fuse=build_config(FuseConfig, values),
         **{name: values[name] for name in _RUN_OPTIONS},

@@ -11,6 +11,8 @@ from resdepth_colmap.config import (
     StereoConfig,
 )
 
+UNFILTERED = StereoConfig(filter=False)
+
 
 class CloudFormat(enum.StrEnum):
     """The file of the fused cloud."""
@@ -26,7 +28,8 @@ class RunConfig:
 
     Attributes:
         backend: Where initial depth comes from.
-        stereo: Options of the CPU PatchMatch.
+        stereo: Options of the PatchMatch; not filtered, as the refinement has more use
+            for a doubtful depth than for a hole.
         refine: Options of the refinement.
         fuse: Options of the fusion.
         no_fuse: Leave out the cloud.
@@ -38,7 +41,7 @@ class RunConfig:
     """
 
     backend: StereoBackend = StereoBackend.AUTO
-    stereo: StereoConfig = dataclasses.field(default_factory=StereoConfig)
+    stereo: StereoConfig = UNFILTERED
     refine: RefineConfig = dataclasses.field(default_factory=RefineConfig)
     fuse: FuseConfig = dataclasses.field(default_factory=FuseConfig)
     no_fuse: bool = False
