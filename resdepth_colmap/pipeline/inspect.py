@@ -16,7 +16,9 @@ from resdepth_colmap.pipeline.initial_map import (
     check_map_size,
     map_path,
 )
+from resdepth_colmap.pipeline.run_config import UNFILTERED
 from resdepth_colmap.pipeline.stereo import choose_backend
+from resdepth_colmap.pipeline.stereo_passes import passes_of
 from resdepth_colmap.scene import Scene, View
 
 MOST_MAPS_READ = 8  # of each kind, spread over the views: info is to be quick
@@ -24,7 +26,7 @@ CFG_NAMES = ("patch-match.cfg", "fusion.cfg")
 
 # Measured on two cores with the default options; a guide, no promise.
 MEASURED_CORES = 2
-STEREO_S_PER_MEGAPIXEL = 30.0
+STEREO_S_PER_MEGAPIXEL_AND_PASS = 20.0
 REFINE_S_PER_MEGAPIXEL_AND_PASS = 1.5
 REFINE_BASE_MB = 700.0  # libraries, weights, one tile in the network
 REFINE_MB_PER_MEGAPIXEL = 150.0  # images, warped views and maps of one view
@@ -115,7 +117,7 @@ def inspect_workspace(
         refine: Options of the run to foresee; None = the defaults.
         stereo: Options of its PatchMatch; None = the defaults.
     """
-    refine, stereo = refine or RefineConfig(), stereo or StereoConfig()
+    refine, stereo = refine or RefineConfig(), stereo or UNFILTERED
     maps, broken = _summaries(workspace, scene)
     backend = choose_backend(StereoBackend.AUTO, workspace, scene)
     missing = missing_images(workspace, scene)
@@ -197,7 +199,8 @@ def _estimate(
     total, largest = sum(sizes), max(sizes, default=0.0)
     slowness = MEASURED_CORES / max(1, os.cpu_count() or 1)
     matched = backend is StereoBackend.CPU
-    stereo_s = STEREO_S_PER_MEGAPIXEL * total * slowness if matched else 0.0
+    pass_s = STEREO_S_PER_MEGAPIXEL_AND_PASS * total * slowness
+    stereo_s = pass_s * len(passes_of(stereo)) if matched else 0.0
     return Estimate(
         megapixels=total,
         stereo_s=stereo_s,

@@ -12,6 +12,7 @@ from resdepth_colmap.config import (
 )
 
 UNFILTERED = StereoConfig(filter=False)
+"""What `refine` matches with, where there are no maps."""
 
 
 class CloudFormat(enum.StrEnum):
