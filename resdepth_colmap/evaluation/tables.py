@@ -116,20 +116,23 @@ def refine_table(measured: Measured) -> str:
 
 def stereo_memory_table(measured: Measured) -> str:
     """Memory of the matcher by the number of views, and how soon it starts."""
-    start, width_px, height_px = measured["start"], *measured["options"]["size_px"]
+    width_px, height_px = measured["options"]["size_px"]
     rows = [
         [str(run["views"]), f"{run['peak_memory_mb'] / 1024:.2f}"]
         for run in measured["memory"]
     ]
     header = f"views of {width_px} x {height_px} px | peak memory, GiB"
-    return "\n\n".join(
-        [
-            f"Measured by `{measured['command']}` on {measured['date']}, {HARDWARE}.",
-            markdown_table(header, rows),
+    parts = [
+        f"Measured by `{measured['command']}` on {measured['date']}, {HARDWARE}.",
+        markdown_table(header, rows),
+    ]
+    if "start" in measured:
+        start = measured["start"]
+        parts.append(
             f"From the call of the program to the first progress: {start['cold_s']:.0f}"
-            f" s with nothing compiled, {start['warm_s']:.1f} s later.",
-        ]
-    )
+            f" s with nothing compiled, {start['warm_s']:.1f} s later."
+        )
+    return "\n\n".join(parts)
 
 
 Renderer = Callable[[Measured], str]
