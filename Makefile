@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: help demo test test-fast check lint types floors fix bench clean
+.PHONY: help demo test test-fast browser check lint types floors fix bench clean
 
 help:  ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -20,11 +20,14 @@ $(READY): pyproject.toml constraints.txt
 demo: $(READY)  ## render a room, match, refine, fuse, and show what changed
 	$(BIN)/resdepth-colmap demo --output demo
 
-test: $(READY)  ## the whole suite
+test: $(READY) browser  ## the whole suite
 	$(BIN)/pytest
 
 test-fast: $(READY)  ## the suite without its slow tests
 	$(BIN)/pytest -m "not slow"
+
+browser:  # the report is tested in a Chromium; those tests skip where there is none
+	@scripts/install_chromium.sh
 
 check: lint types floors test  ## all that must be green
 

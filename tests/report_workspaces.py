@@ -140,7 +140,8 @@ def _write_inputs(
 
 def _noisy(depth: DepthMap, rng: np.random.Generator, noise: float) -> DepthMap:
     factors = 1 + noise * rng.standard_normal(depth.shape)
-    return (depth * factors.clip(0.1, 2)).astype(np.float32)
+    noisy: DepthMap = (depth * factors.clip(0.1, 2)).astype(np.float32)
+    return noisy
 
 
 def _cloud(color: tuple[int, int, int]) -> PointCloud:

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
+import scipy.spatial
 
 from resdepth_colmap.io.png import encode_png
 from resdepth_colmap.io.point_cloud import PointCloud
@@ -26,6 +27,7 @@ _LOOK_DOWN = 0.25  # of the way ahead
 _LOOK_ASIDE = 0.2
 _PERCENT_IN_SIGHT = 94.0
 _POINTS_LOOKED_AT = 20_000
+_SPACINGS = (0.0003 * SIZE, 0.03 * SIZE)
 
 
 Positions = npt.NDArray[np.float32]
@@ -93,6 +95,16 @@ def packed_cloud(cloud: PointCloud, box: CloudBox, most: int) -> PackedCloud | N
         colors=encode_png(np.ascontiguousarray(sample.colors[inside][order][None])),
         num_points=len(order),
     )
+
+
+def point_spacing(cloud: PointCloud, box: CloudBox, most: int) -> float:
+    """Median distance of the points that are shown to their nearest one, page units."""
+    shown = box.shown(cloud.sampled(most).points)
+    if len(shown) < 2:
+        return SIZE / 10
+    some = shown[:: max(1, len(shown) // _POINTS_LOOKED_AT)]
+    distance, _ = scipy.spatial.cKDTree(shown).query(some, k=2)
+    return float(np.clip(np.median(distance[:, 1]), *_SPACINGS))
 
 
 def first_look(

@@ -20,6 +20,7 @@ from resdepth_colmap.report.cloud_data import (
     camera_outline,
     first_look,
     packed_cloud,
+    point_spacing,
 )
 from resdepth_colmap.report.image_maps import ImageMaps
 from resdepth_colmap.report.packing import (
@@ -95,6 +96,7 @@ def cloud_content(
     box = CloudBox.of(*known.values())
     facts: dict[str, Any] = {
         "size": SIZE,
+        "spacing": point_spacing(after, box, budget.num_points),
         "look": first_look(views, after.points, box),
         "cameras": [camera_outline(view, box) for view in views],
         "clouds": {},

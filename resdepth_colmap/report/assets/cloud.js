@@ -3,6 +3,7 @@
 const TURN = 0.08; // radians a key press
 const ZOOM = 1.12;
 const MOVE = 0.25; // page units
+const POINT_SIZE = 0.5; // of the points' spacing, for each step of the slider
 
 const CLOUD_HINT =
   "Drag to turn, two fingers or the right button to move, wheel or pinch to zoom after a click. " +
@@ -116,7 +117,7 @@ class CloudViewer {
   }
 
   setPointSize(value) {
-    this.material.size = value * 0.003;
+    this.material.size = value * POINT_SIZE * this.facts.spacing;
     this.draw();
   }
 
