@@ -174,7 +174,8 @@ def parsed() -> argparse.Namespace:
     parser.add_argument("--work", type=Path, required=True, help="weights and samples")
     parser.add_argument("--steps", type=int, default=3000)
     parser.add_argument("--width", type=int, default=16, help="base channels")
-    parser.add_argument("--normalisation", choices=Normalisation, default="baseline")
+    kinds = [str(kind) for kind in Normalisation]
+    parser.add_argument("--normalisation", choices=kinds, default="baseline")
     parser.add_argument("--levels", type=int, default=NetworkConfig.levels)
     parser.add_argument("--crop-px", type=int, default=TrainConfig.crop_px)
     parser.add_argument("--learning-rate", type=float, default=1e-3)

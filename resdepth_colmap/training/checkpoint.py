@@ -91,7 +91,7 @@ def load_state(output: Path, run: Optimisation) -> Position:
     if not path.exists():
         return Position()
     try:
-        state = torch.load(path, map_location=run.ranks.device, weights_only=True)
+        state = torch.load(path, map_location="cpu", weights_only=True)
     except Exception as error:  # torch raises what unpickling and zip happen to raise
         raise TrainingError(
             f"{path}: not a readable state ({error}); start in another --output with "
