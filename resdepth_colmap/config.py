@@ -75,7 +75,10 @@ class StereoConfig(Config):
         window_radius: Half width of the matching window, in pixels.
         window_step: Sample every so many pixels of the window.
         sigma_color: Spread of the bilateral weight in grey values (0..1).
-        num_iterations: Red-black sweeps over the image.
+        smoothness: Weight of the roughness of the surface, beside a matching cost in
+            0..2; 0 = each pixel for itself, as in COLMAP.
+        num_iterations: Red-black sweeps over the image; half as many in the geometric
+            pass.
         max_num_sources: Use at most so many of the sources that patch-match.cfg names.
         max_image_size: Longest image side to match at, in pixels; -1 = as it is.
         depth_min: Nearest depth, in workspace units; -1 = from the scene.
@@ -97,10 +100,11 @@ class StereoConfig(Config):
         seed: Seed of the random hypotheses.
     """
 
-    window_radius: int = 5
+    window_radius: int = 4
     window_step: int = 2
-    sigma_color: float = 0.2
-    num_iterations: int = 6
+    sigma_color: float = 0.06
+    smoothness: float = 1.0
+    num_iterations: int = 4
     max_num_sources: int = 6
     max_image_size: int = -1
     depth_min: float = -1.0
@@ -128,6 +132,7 @@ class StereoConfig(Config):
             window_step=self.window_step,
         )
         self._check(self.sigma_color > 0, "more than 0", sigma_color=self.sigma_color)
+        self._check(self.smoothness >= 0, "0 or more", smoothness=self.smoothness)
         self._check(
             self.num_iterations >= 1, "at least 1", num_iterations=self.num_iterations
         )

@@ -1,73 +1,134 @@
-"""How well a plane explains the views: bilateral NCC. Compiled by numba.
+"""How well a plane explains a source view: bilateral NCC. Compiled by numba.
 
 All arrays are float32. Sources lie one after the other in one flat array, so that any
 number of images of any size is one argument.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 from numba import njit
 
 MAX_COST = np.float32(2.0)  # COLMAP's kMaxCost: 1 - NCC of perfectly opposite patches
+OUTSIDE = np.float32(1.0)  # the source does not see the plane: neither good nor bad
 MIN_VARIANCE = np.float32(1e-5)  # COLMAP: below it a patch has no texture
 ZERO, ONE, SMALL = np.float32(0), np.float32(1), np.float32(1e-3)
 
+FloatArray = npt.NDArray[np.float32]
+IntArray = npt.NDArray[np.int64]
+
+
+class Window(NamedTuple):
+    """Where a window is sampled.
+
+    Attributes:
+        dx: Offsets in pixels, shape (N,); N is a multiple of 8, as loops are vectors.
+        dy: Likewise.
+        spatial: Spatial weight of each sample, (N,); 0 = a filler.
+        sigma_color: Spread of the bilateral weight in grey values.
+    """
+
+    dx: FloatArray
+    dy: FloatArray
+    spatial: FloatArray
+    sigma_color: np.float32
+
+
+class Sources(NamedTuple):
+    """The source views, as seen from the reference.
+
+    Attributes:
+        A: Shape (S, 3, 3): a pixel lies at ``A (x, y, 1) + b inverse_depth``.
+        b: Shape (S, 3).
+        pixels: Grey values of all images, one image after the other.
+        inverse_depths: Their inverse depth maps likewise, 0 = none; or empty.
+        starts: Where each image starts, (S,).
+        sizes: Width and height of each, (S, 2).
+    """
+
+    A: FloatArray
+    b: FloatArray
+    pixels: FloatArray
+    inverse_depths: FloatArray
+    starts: IntArray
+    sizes: IntArray
+
 
 @njit(cache=True, fastmath=True)
-def reference_window(reference, x, y, offsets, sigma_color, weights, values):
+def reference_window(reference, x, y, window, weights, values):
     """Bilateral weights of a window (COLMAP, patch_match_cuda.cu), summing to 1.
+
+    The weight of a grey value, exp(-a), is taken as (1 - a / 8)^8, which needs no call
+    and so lets the loop be vectorised.
 
     Returns:
         Weighted mean and variance of the reference's grey values.
     """
     height, width = reference.shape
+    pixels = reference.reshape(-1)
+    row = np.int32(width)
+    x_last, y_last = np.float32(width - 1), np.float32(height - 1)
+    fx, fy = np.float32(x), np.float32(y)
     center = reference[y, x]
-    color_factor = np.float32(-0.5) / (sigma_color * sigma_color)
-    total = np.float32(0)
-    mean = np.float32(0)
-    square = np.float32(0)
-    for k in range(offsets.shape[1]):
-        xs = min(max(x + np.int64(offsets[0, k]), 0), width - 1)
-        ys = min(max(y + np.int64(offsets[1, k]), 0), height - 1)
-        value = reference[ys, xs]
+    color_factor = np.float32(-0.0625) / (window.sigma_color * window.sigma_color)
+    total, mean, square = ZERO, ZERO, ZERO
+    for k in range(window.dx.shape[0]):
+        xs = fx + window.dx[k]
+        ys = fy + window.dy[k]
+        xs = xs if xs > ZERO else ZERO
+        ys = ys if ys > ZERO else ZERO
+        xs = xs if xs < x_last else x_last
+        ys = ys if ys < y_last else y_last
+        value = pixels[np.uint64(np.uint32(np.int32(ys) * row + np.int32(xs)))]
         delta = value - center
-        weight = math.exp(offsets[2, k] + delta * delta * color_factor)
+        weight = ONE + delta * delta * color_factor
+        weight = weight if weight > ZERO else ZERO
+        weight *= weight
+        weight *= weight
+        weight = window.spatial[k] * weight * weight
         weights[k] = weight
         values[k] = value
         total += weight
         mean += weight * value
         square += weight * value * value
-    for k in range(offsets.shape[1]):
-        weights[k] /= total
-    mean /= total
-    return mean, max(square / total - mean * mean, np.float32(0))
+    inverse = ONE / (total + np.float32(1e-12))  # the centre may be no sample
+    for k in range(window.dx.shape[0]):
+        weights[k] *= inverse
+    mean *= inverse
+    return mean, max(square * inverse - mean * mean, ZERO)
 
 
 @njit(cache=True, fastmath=True)
-def plane_cost(x, y, w, gx, gy, A, b, pixels, width, height, offsets, weights, values,
-                mean, variance):  # fmt: skip
-    """1 - NCC of the reference's window and the source's, in 0..2."""
-    u0 = A[0, 0] * x + A[0, 1] * y + A[0, 2] + b[0] * w
-    u1 = A[1, 0] * x + A[1, 1] * y + A[1, 2] + b[1] * w
-    u2 = A[2, 0] * x + A[2, 1] * y + A[2, 2] + b[2] * w
-    if u2 < np.float32(1e-3):
-        return MAX_COST
+def plane_cost(x, y, w, gx, gy, sources, s, window, weights, values, mean, variance):
+    """1 - NCC of the reference's window and that of source s, in 0..2.
+
+    `OUTSIDE` where the plane's centre is behind the source or out of its image,
+    `MAX_COST` where there is no texture.
+    """
+    A, b, pixels = sources.A, sources.b, sources.pixels
+    width, height = sources.sizes[s, 0], sources.sizes[s, 1]
+    start = np.uint64(sources.starts[s])
+    u0 = A[s, 0, 0] * x + A[s, 0, 1] * y + A[s, 0, 2] + b[s, 0] * w
+    u1 = A[s, 1, 0] * x + A[s, 1, 1] * y + A[s, 1, 2] + b[s, 1] * w
+    u2 = A[s, 2, 0] * x + A[s, 2, 1] * y + A[s, 2, 2] + b[s, 2] * w
+    if u2 < SMALL:
+        return OUTSIDE
     xc, yc = u0 / u2, u1 / u2
-    if xc < 0 or yc < 0 or xc > width - 1 or yc > height - 1:
-        return MAX_COST
-    ux0, ux1, ux2 = A[0, 0] + b[0] * gx, A[1, 0] + b[1] * gx, A[2, 0] + b[2] * gx
-    uy0, uy1, uy2 = A[0, 1] + b[0] * gy, A[1, 1] + b[1] * gy, A[2, 1] + b[2] * gy
+    if not (xc >= 0 and yc >= 0 and xc <= width - 1 and yc <= height - 1):
+        return OUTSIDE
+    ux0, uy0 = A[s, 0, 0] + b[s, 0] * gx, A[s, 0, 1] + b[s, 0] * gy
+    ux1, uy1 = A[s, 1, 0] + b[s, 1] * gx, A[s, 1, 1] + b[s, 1] * gy
+    ux2, uy2 = A[s, 2, 0] + b[s, 2] * gx, A[s, 2, 1] + b[s, 2] * gy
     x_last = np.float32(width) - np.float32(1.001)
     y_last = np.float32(height) - np.float32(1.001)
     row = np.int32(width)
-    source_mean = np.float32(0)
-    source_square = np.float32(0)
-    product = np.float32(0)
+    source_mean, source_square, product = ZERO, ZERO, ZERO
     # Selects instead of min and max, and unsigned 32-bit indices, which need no test
     # for negative ones: LLVM then vectorises the loop with gathers (twice as fast).
-    for k in range(offsets.shape[1]):
-        dx, dy = offsets[0, k], offsets[1, k]
+    for k in range(window.dx.shape[0]):
+        dx, dy = window.dx[k], window.dy[k]
         z = u2 + ux2 * dx + uy2 * dy
         z = z if z > SMALL else SMALL
         inverse = ONE / z
@@ -79,8 +140,8 @@ def plane_cost(x, y, w, gx, gy, A, b, pixels, width, height, offsets, weights, v
         ys = ys if ys < y_last else y_last
         x0, y0 = np.int32(xs), np.int32(ys)
         ax, ay = xs - np.float32(x0), ys - np.float32(y0)
-        upper = np.uint64(np.uint32(y0 * row + x0))
-        lower = np.uint64(np.uint32(y0 * row + x0 + row))
+        upper = start + np.uint64(np.uint32(y0 * row + x0))
+        lower = start + np.uint64(np.uint32(y0 * row + x0 + row))
         top = pixels[upper]
         top += ax * (pixels[upper + np.uint64(1)] - top)
         low = pixels[lower]
@@ -94,39 +155,6 @@ def plane_cost(x, y, w, gx, gy, A, b, pixels, width, height, offsets, weights, v
     if variance < MIN_VARIANCE or source_variance < MIN_VARIANCE:
         return MAX_COST
     ncc = (product - mean * source_mean) / math.sqrt(variance * source_variance)
-    return min(max(np.float32(1.0) - np.float32(ncc), np.float32(0)), MAX_COST)
-
-
-@njit(cache=True, fastmath=True)
-def weigh_views(costs, num_states, sweep, weights):
-    """Weights of the sources (ACMM, section 3.2: multi-hypothesis view selection).
-
-    A source counts when at least two hypotheses match well in it and few badly; the
-    bar for "well" drops with the sweeps. Where none counts, the best half does.
-    """
-    num_sources = costs.shape[1]
-    bar = np.float32(0.8) * math.exp(-np.float32(sweep * sweep) / np.float32(90.0))
-    total = np.float32(0)
-    for s in range(num_sources):
-        good, bad, weight = 0, 0, np.float32(0)
-        for i in range(num_states):
-            cost = costs[i, s]
-            if cost < bar:
-                good += 1
-                weight += math.exp(-cost * cost / np.float32(0.18))
-            elif cost > np.float32(1.2):
-                bad += 1
-        weights[s] = weight / good if good >= 2 and bad < 4 else np.float32(0)
-        total += weights[s]
-    if total > 0:
-        for s in range(num_sources):
-            weights[s] /= total
-        return
-    for s in range(num_sources):
-        best = np.float32(3.0)
-        for i in range(num_states):
-            best = min(best, costs[i, s])
-        weights[s] = math.exp(-best * best / np.float32(0.18)) + np.float32(1e-6)
-        total += weights[s]
-    for s in range(num_sources):
-        weights[s] /= total
+    cost = min(max(ONE - np.float32(ncc), ZERO), MAX_COST)
+    # Exactly OUTSIDE would be taken for a plane out of sight.
+    return cost if cost != OUTSIDE else np.float32(0.9999999)

@@ -1,18 +1,23 @@
 """PatchMatch multi-view stereo of one reference view, on the CPU.
 
 The method is COLMAP's (Schoenberger et al., ECCV 2016: bilateral NCC, slanted planes,
-photometric consistency) with the red-black propagation and view selection of ACMM
-(Xu & Tao, CVPR 2019), which suit many cores and need no sequential sweeps.
+a photometric and a geometric pass) with the red-black propagation and view selection of
+ACMM (Xu & Tao, CVPR 2019), which suit many cores and need no sequential sweeps. What is
+not COLMAP's: a truncated smoothness term (`smoothness.py`), which decides where the
+photographs do not, and visibility in the geometric pass (`visibility.py`).
 """
 
 import dataclasses
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
 from resdepth_colmap.config import StereoConfig
 from resdepth_colmap.scene import DepthMap, FloatMap, GrayImage, Matrix, NormalMap
+
+if TYPE_CHECKING:
+    from resdepth_colmap.matching.cost import Sources, Window
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
@@ -31,18 +36,28 @@ class MatchView:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
-class MatchResult:
-    """What matching finds, unfiltered: every pixel has a value.
+class Surface:
+    """Depth and normal of every pixel of a view.
 
     Attributes:
-        depth: Shape (H, W), in workspace units, all > 0.
-        normals: Shape (H, W, 3), camera frame, towards the camera.
-        cost: 1 - NCC weighted over the chosen sources, in 0..2, shape (H, W).
+        depth: Shape (H, W), in workspace units; 0 = none.
+        normals: Shape (H, W, 3), camera frame, towards the camera; (0, 0, 0) = none.
     """
 
     depth: DepthMap
     normals: NormalMap
-    cost: FloatMap
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
+class MatchResult(Surface):
+    """What matching finds, unfiltered: every pixel has a depth and a normal.
+
+    Attributes:
+        source_costs: 1 - NCC of each pixel's plane in each source, shape (S, H, W), in
+            0..2; 1 exactly where the source does not see it.
+    """
+
+    source_costs: FloatMap
 
 
 def match_view(
@@ -50,18 +65,25 @@ def match_view(
     sources: Sequence[MatchView],
     depth_range: tuple[float, float],
     config: StereoConfig,
+    *,
+    start: Surface | None = None,
+    source_depths: Sequence[DepthMap] | None = None,
     on_sweep: Callable[[int, int], None] | None = None,
 ) -> MatchResult:
     """Find depth and normal of every pixel of the reference view.
 
     The result depends on the inputs and `config.seed` alone, not on the number of
-    threads.
+    threads. The photometric pass starts by chance; the geometric one (COLMAP's
+    geom_consistency) starts from the photometric maps, and weighs the sources' maps.
 
     Args:
         reference: The view whose maps are made.
         sources: At least one other view.
         depth_range: Nearest and farthest depth, in workspace units.
         config: Options; `max_image_size` and `max_num_sources` are the caller's.
+        start: The view's photometric maps; None = by chance.
+        source_depths: Depth map of each source, of the size of its image, 0 = none;
+            None = the photometric pass.
         on_sweep: Called after each sweep with its number from 1 and their total.
 
     Raises:
@@ -74,31 +96,66 @@ def match_view(
         raise ValueError(f"{depth_range=} but expected 0 < near < far.")
     from resdepth_colmap.matching import sweeps  # numba: slow import
 
-    height, width = reference.gray.shape
-    planes = np.zeros((height, width, 3), np.float32)
-    costs = np.zeros((height, width), np.float32)
+    gray = np.ascontiguousarray(reference.gray, np.float32)
     K = reference.K.astype(np.float32)
-    arguments = (
-        np.ascontiguousarray(reference.gray),
-        K,
-        planes,
-        costs,
-        *_projections(reference, sources),
-        *_flat_images(sources),
-        _window_offsets(config),
-        np.array([1.0 / far, 1.0 / near], np.float32),
-        np.float32(config.sigma_color),
-        config.seed,
-    )
-    sweeps.start(*arguments)
-    for number in range(1, config.num_iterations + 1):
+    flat = _flat_sources(reference, sources, source_depths)
+    window = _window(config)
+    w_range = np.array([1.0 / far, 1.0 / near], np.float32)
+    planes = np.zeros((*gray.shape, 3), np.float32)
+    source_costs = np.zeros((len(sources), *gray.shape), np.float32)
+    if start is None:
+        sweeps.random_planes(planes, K, w_range, config.seed)
+    else:
+        sweeps.planes_of(start.depth, start.normals, K, w_range, planes)
+    sweeps.match_costs(gray, planes, flat, window, source_costs)
+    costs = source_costs.mean(axis=0)
+    geometric = source_depths is not None
+    half = (config.num_iterations + 1) // 2
+    total = half if geometric else config.num_iterations
+    # The geometric pass goes on where the photometric one stopped.
+    first = config.num_iterations + 1 if geometric else 1
+    for number in range(first, first + total):
+        # Smooth from the start, chance would freeze into islands.
+        smoothness = np.float32(config.smoothness if number > half else 0.0)
         for color in (0, 1):
-            sweeps.sweep(*arguments, number, color)
+            sweeps.sweep(
+                *(gray, K, planes, costs, flat, window, w_range, smoothness),
+                *(config.seed, number, color, geometric),
+            )
         if on_sweep:
-            on_sweep(number, config.num_iterations)
-    normals = np.zeros((height, width, 3), np.float32)
+            on_sweep(number - first + 1, total)
+    sweeps.match_costs(gray, planes, flat, window, source_costs)
+    normals = np.zeros((*gray.shape, 3), np.float32)
     sweeps.normals_of(planes, K, normals)
-    return MatchResult(depth=1.0 / planes[..., 0], normals=normals, cost=costs)
+    return MatchResult(
+        depth=np.reciprocal(planes[..., 0]), normals=normals, source_costs=source_costs
+    )
+
+
+def _flat_sources(
+    reference: MatchView,
+    sources: Sequence[MatchView],
+    source_depths: Sequence[DepthMap] | None,
+) -> "Sources":
+    """The sources as the kernels take them."""
+    from resdepth_colmap.matching.cost import Sources
+
+    sizes = np.array([source.gray.shape[::-1] for source in sources], np.int64)
+    ends = np.cumsum(sizes.prod(axis=1))
+    pixels = np.concatenate([source.gray.ravel() for source in sources])
+    inverse = np.zeros(0, np.float32)
+    if source_depths is not None:
+        depths = np.concatenate([depth.ravel() for depth in source_depths])
+        inverse = np.divide(1.0, depths, out=np.zeros_like(depths), where=depths > 0)
+    A, b = _projections(reference, sources)
+    return Sources(
+        A=A,
+        b=b,
+        pixels=pixels.astype(np.float32),
+        inverse_depths=inverse.astype(np.float32),
+        starts=ends - sizes.prod(axis=1),
+        sizes=sizes,
+    )
 
 
 def _projections(
@@ -117,21 +174,19 @@ def _projections(
     return np.array(A, np.float32), np.array(b, np.float32)
 
 
-def _flat_images(
-    sources: Sequence[MatchView],
-) -> tuple[FloatMap, npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """All pixels one after the other, where each image starts, and (width, height)."""
-    sizes = np.array([source.gray.shape[::-1] for source in sources], np.int64)
-    ends = np.cumsum(sizes.prod(axis=1))
-    pixels = np.concatenate([source.gray.ravel() for source in sources])
-    return pixels.astype(np.float32), ends - sizes.prod(axis=1), sizes
+def _window(config: StereoConfig) -> "Window":
+    """The window's samples, filled up to a multiple of 8."""
+    from resdepth_colmap.matching.cost import Window
 
-
-def _window_offsets(config: StereoConfig) -> FloatMap:
-    """The window's samples: dx, dy and the logarithm of the spatial weight, (3, N)."""
     radius = config.window_radius
     steps = np.arange(-radius, radius + 1, config.window_step, dtype=np.float32)
     dx, dy = (grid.ravel() for grid in np.meshgrid(steps, steps))
     # COLMAP: sigma_spatial is the window's radius.
-    spatial = -(dx**2 + dy**2) / (2.0 * radius**2)
-    return np.stack([dx, dy, spatial]).astype(np.float32)
+    spatial = np.exp(-(dx**2 + dy**2) / (2.0 * radius**2))
+    fill = (0, -len(dx) % 8)
+    return Window(
+        dx=np.pad(dx, fill),
+        dy=np.pad(dy, fill),
+        spatial=np.pad(spatial, fill).astype(np.float32),
+        sigma_color=np.float32(config.sigma_color),
+    )

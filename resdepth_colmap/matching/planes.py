@@ -107,11 +107,13 @@ def random_gradient(w, x, y, K, state):
 
 
 @njit(cache=True, fastmath=True, inline="always")
-def inverse_depth_per_px(x, y, w, A, b):
-    """Change of inverse depth that moves the pixel by one pixel in the source."""
-    u0 = A[0, 0] * x + A[0, 1] * y + A[0, 2] + b[0] * w
-    u1 = A[1, 0] * x + A[1, 1] * y + A[1, 2] + b[1] * w
-    u2 = max(A[2, 0] * x + A[2, 1] * y + A[2, 2] + b[2] * w, np.float32(1e-3))
-    dx = (b[0] - b[2] * u0 / u2) / u2
-    dy = (b[1] - b[2] * u1 / u2) / u2
+def inverse_depth_per_px(x, y, w, A, b, s):
+    """Change of inverse depth that moves the pixel by one pixel in source s."""
+    u0 = A[s, 0, 0] * x + A[s, 0, 1] * y + A[s, 0, 2] + b[s, 0] * w
+    u1 = A[s, 1, 0] * x + A[s, 1, 1] * y + A[s, 1, 2] + b[s, 1] * w
+    u2 = max(
+        A[s, 2, 0] * x + A[s, 2, 1] * y + A[s, 2, 2] + b[s, 2] * w, np.float32(1e-3)
+    )
+    dx = (b[s, 0] - b[s, 2] * u0 / u2) / u2
+    dy = (b[s, 1] - b[s, 2] * u1 / u2) / u2
     return np.float32(1.0) / (math.sqrt(dx * dx + dy * dy) + np.float32(1e-12))

@@ -1,14 +1,12 @@
 """The sweeps of the PatchMatch over the checkerboard. Compiled by numba."""
 
-import math
-
 import numba
 import numpy as np
 from numba import njit, prange
 
-from resdepth_colmap.matching.cost import plane_cost, reference_window, weigh_views
+from resdepth_colmap.matching.cost import MAX_COST, plane_cost, reference_window
+from resdepth_colmap.matching.perturbation import NUM_TRIALS, make_trials
 from resdepth_colmap.matching.planes import (
-    faces_camera,
     inverse_depth_at,
     inverse_depth_per_px,
     next_random,
@@ -17,6 +15,18 @@ from resdepth_colmap.matching.planes import (
     random_gradient,
     seeded_state,
 )
+from resdepth_colmap.matching.propagation import (
+    NUM_STATES,
+    earlier_twin,
+    gather_states,
+)
+from resdepth_colmap.matching.smoothness import (
+    NUM_NEIGHBORS,
+    gather_neighbors,
+    roughness,
+)
+from resdepth_colmap.matching.view_weights import weigh_views
+from resdepth_colmap.matching.visibility import bounded_cost, geometric_cost
 
 # Without this numba tries TBB first, and warns where it finds an old one.
 numba.config.THREADING_LAYER_PRIORITY = [  # type: ignore[attr-defined] # set at run time
@@ -25,199 +35,41 @@ numba.config.THREADING_LAYER_PRIORITY = [  # type: ignore[attr-defined] # set at
     "workqueue",
 ]
 
-NUM_STATES = 9  # eight neighbours and the plane that the pixel has
-NUM_TRIALS = 6  # random and perturbed planes
-
-# The checkerboard's regions (Xu & Tao, ACMM, CVPR 2019, fig. 2): four near ones shaped
-# like a V and four far strips. All offsets are odd, so that a sweep over one colour
-# reads only the other one and its result does not depend on the order.
-_NEAR = [(0, -1), (-1, -2), (1, -2), (-2, -3), (2, -3), (-3, -4), (3, -4)]
-_FAR = [(0, -step) for step in range(3, 25, 2)]
-
-
-def _regions() -> tuple[np.ndarray, np.ndarray]:
-    offsets = np.zeros((8, len(_FAR), 2), np.int64)
-    counts = np.zeros(8, np.int64)
-    for turn in range(4):
-        for far, base in enumerate((_NEAR, _FAR)):
-            region = 2 * turn + far
-            counts[region] = len(base)
-            for index, (x, y) in enumerate(base):
-                for _ in range(turn):
-                    x, y = -y, x
-                offsets[region, index] = (x, y)
-    return offsets, counts
-
-
-REGION_OFFSETS, REGION_COUNTS = _regions()
+ONE = np.float32(1)
+LEAST_WEIGHT = np.float32(0.01)  # a source below it is not asked about trials
 
 
 @njit(cache=True, parallel=True, fastmath=True)
-def start(reference, K, planes, costs, A, b, pixels, starts, sizes, offsets, w_range,
-          sigma_color, seed):  # fmt: skip
-    """Random planes, uniform in inverse depth, and their mean cost over the sources."""
-    height, width = reference.shape
+def random_planes(planes, K, w_range, seed):
+    """Fill planes (H, W, 3) by chance, uniform in inverse depth."""
+    height, width = planes.shape[:2]
     for y in prange(height):
-        weights = np.empty(offsets.shape[1], np.float32)
-        values = np.empty(offsets.shape[1], np.float32)
         for x in range(width):
-            mean, variance = reference_window(
-                reference, x, y, offsets, sigma_color, weights, values
-            )
             state = seeded_state(seed, y * width + x, 0)
             u, state = next_random(state)
             w = inverse_depth_at(u, w_range)
             fx, fy = np.float32(x), np.float32(y)
             gx, gy, state = random_gradient(w, fx, fy, K, state)
-            cost = np.float32(0)
-            for s in range(A.shape[0]):
-                cost += plane_cost(
-                    fx, fy, w, gx, gy, A[s], b[s], pixels[starts[s] :], sizes[s, 0],
-                    sizes[s, 1], offsets, weights, values, mean, variance,
-                )  # fmt: skip
             planes[y, x, 0], planes[y, x, 1], planes[y, x, 2] = w, gx, gy
-            costs[y, x] = cost / A.shape[0]
-
-
-@njit(cache=True, fastmath=True)
-def _gather_states(x, y, planes, costs, w_range, K, states):
-    """The best plane of each checkerboard region, and the pixel's own (last).
-
-    Returns:
-        Number of states found.
-    """
-    height, width = costs.shape
-    count = 0
-    for region in range(8):
-        best = np.float32(1e9)
-        bx, by = -1, -1
-        for index in range(REGION_COUNTS[region]):
-            nx = x + REGION_OFFSETS[region, index, 0]
-            ny = y + REGION_OFFSETS[region, index, 1]
-            if 0 <= nx < width and 0 <= ny < height and costs[ny, nx] < best:
-                best = costs[ny, nx]
-                bx, by = nx, ny
-        if bx < 0:
-            continue
-        gx, gy = planes[by, bx, 1], planes[by, bx, 2]
-        w = planes[by, bx, 0] + gx * (x - bx) + gy * (y - by)
-        if w_range[0] <= w <= w_range[1]:
-            n = plane_normal(w, gx, gy, np.float32(x), np.float32(y), K)
-            if faces_camera(n[0], n[1], n[2], np.float32(x), np.float32(y), K):
-                states[count, 0], states[count, 1], states[count, 2] = w, gx, gy
-                count += 1
-    for i in range(3):
-        states[count, i] = planes[y, x, i]
-    return count + 1
-
-
-@njit(cache=True, fastmath=True)
-def _make_trials(plane, x, y, K, w_range, w_per_px, state, trials):
-    """Random and perturbed planes (COLMAP: five combinations; here a sixth).
-
-    Perturbations are log-uniform from 3 px down to 0.02 px of disparity, so that each
-    sweep searches both widely and finely.
-    """
-    w, gx, gy = plane[0], plane[1], plane[2]
-    u, state = next_random(state)
-    w_random = inverse_depth_at(u, w_range)
-    gx_random, gy_random, state = random_gradient(w, x, y, K, state)
-    nx, ny, nz = plane_normal(w, gx, gy, x, y, K)
-    u, state = next_random(state)
-    size = np.float32(0.5) * np.float32(math.exp(np.float32(-4.0) * u))
-    dx, state = next_random(state)
-    dy, state = next_random(state)
-    dz, state = next_random(state)
-    nx += size * (np.float32(2) * dx - np.float32(1))
-    ny += size * (np.float32(2) * dy - np.float32(1))
-    nz += size * (np.float32(2) * dz - np.float32(1))
-    gx_near, gy_near = gx, gy
-    if faces_camera(nx, ny, nz, x, y, K):
-        gx_near, gy_near = plane_gradient(w, nx, ny, nz, x, y, K)
-    steps = (np.float32(0), np.float32(0))
-    for _ in range(2):
-        u, state = next_random(state)
-        sign, state = next_random(state)
-        step = np.float32(3.0) * np.float32(math.exp(np.float32(-5.0) * u)) * w_per_px
-        if sign < np.float32(0.5):
-            step = -step
-        steps = (steps[1], step)
-    ratio = w_random / w
-    _set(trials, 0, w, gx_random, gy_random)
-    _set(trials, 1, w_random, gx * ratio, gy * ratio)
-    _set(trials, 2, w_random, gx_random * ratio, gy_random * ratio)
-    _set(trials, 3, w, gx_near, gy_near)
-    _set(trials, 4, w + steps[0], gx, gy)
-    _set(trials, 5, w + steps[1], gx_near, gy_near)
-
-
-@njit(cache=True, inline="always")
-def _set(trials, index, w, gx, gy):
-    trials[index, 0] = w
-    trials[index, 1] = gx
-    trials[index, 2] = gy
 
 
 @njit(cache=True, parallel=True, fastmath=True)
-def sweep(reference, K, planes, costs, A, b, pixels, starts, sizes, offsets, w_range,
-          sigma_color, seed, number, color):  # fmt: skip
-    """Update the pixels of one colour of the checkerboard in place.
-
-    Each pixel takes the best of its own plane, those of eight neighbouring regions,
-    and random and perturbed ones, by the cost weighted over the sources.
-    """
-    height, width = reference.shape
-    num_sources = A.shape[0]
+def planes_of(depth, normals, K, w_range, planes):
+    """Fill planes (H, W, 3) from depth (H, W) and normals (H, W, 3)."""
+    height, width = depth.shape
     for y in prange(height):
-        weights = np.empty(offsets.shape[1], np.float32)
-        values = np.empty(offsets.shape[1], np.float32)
-        states = np.empty((NUM_STATES, 3), np.float32)
-        trials = np.empty((NUM_TRIALS, 3), np.float32)
-        matrix = np.empty((NUM_STATES, num_sources), np.float32)
-        view_weights = np.empty(num_sources, np.float32)
-        for x in range((y + color) % 2, width, 2):
-            mean, variance = reference_window(
-                reference, x, y, offsets, sigma_color, weights, values
-            )
-            fx, fy = np.float32(x), np.float32(y)
-            count = _gather_states(x, y, planes, costs, w_range, K, states)
-            for i in range(count):
-                for s in range(num_sources):
-                    matrix[i, s] = plane_cost(
-                        fx, fy, states[i, 0], states[i, 1], states[i, 2], A[s], b[s],
-                        pixels[starts[s] :], sizes[s, 0], sizes[s, 1], offsets, weights,
-                        values, mean, variance,
-                    )  # fmt: skip
-            weigh_views(matrix, count, number, view_weights)
-            best, best_cost = count - 1, np.float32(1e9)
-            for i in range(count - 1, -1, -1):  # its own plane first: it wins ties
-                cost = np.float32(0)
-                for s in range(num_sources):
-                    cost += view_weights[s] * matrix[i, s]
-                if cost < best_cost:
-                    best, best_cost = i, cost
-            plane = states[best]
-            main = np.argmax(view_weights)
-            w_per_px = inverse_depth_per_px(fx, fy, plane[0], A[main], b[main])
-            state = seeded_state(seed, y * width + x, number)
-            _make_trials(plane, fx, fy, K, w_range, w_per_px, state, trials)
-            for i in range(NUM_TRIALS):
-                if not w_range[0] <= trials[i, 0] <= w_range[1]:
-                    continue
-                cost = np.float32(0)
-                for s in range(num_sources):
-                    if view_weights[s] > np.float32(0.01) and cost < best_cost:
-                        cost += view_weights[s] * plane_cost(
-                            fx, fy, trials[i, 0], trials[i, 1], trials[i, 2], A[s],
-                            b[s], pixels[starts[s] :], sizes[s, 0], sizes[s, 1],
-                            offsets, weights, values, mean, variance,
-                        )  # fmt: skip
-                if cost < best_cost:
-                    best_cost = cost
-                    plane = trials[i]
-            for i in range(3):
-                planes[y, x, i] = plane[i]
-            costs[y, x] = best_cost
+        for x in range(width):
+            w = w_range[0]
+            if depth[y, x] > 0:
+                w = min(max(ONE / depth[y, x], w_range[0]), w_range[1])
+            n = normals[y, x]
+            planes[y, x, 0] = w
+            planes[y, x, 1], planes[y, x, 2] = np.float32(0), np.float32(0)
+            if n[2] < 0:
+                gx, gy = plane_gradient(
+                    w, n[0], n[1], n[2], np.float32(x), np.float32(y), K
+                )
+                planes[y, x, 1], planes[y, x, 2] = gx, gy
 
 
 @njit(cache=True, parallel=True, fastmath=True)
@@ -229,3 +81,148 @@ def normals_of(planes, K, normals):
             n = plane_normal(planes[y, x, 0], planes[y, x, 1], planes[y, x, 2],
                         np.float32(x), np.float32(y), K)  # fmt: skip
             normals[y, x, 0], normals[y, x, 1], normals[y, x, 2] = n[0], n[1], n[2]
+
+
+@njit(cache=True, parallel=True, fastmath=True)
+def match_costs(reference, planes, sources, window, costs):
+    """1 - NCC of each pixel's plane in each source: costs, shape (S, H, W), 0..2."""
+    height, width = reference.shape
+    for y in prange(height):
+        weights = np.empty(window.dx.shape[0], np.float32)
+        values = np.empty(window.dx.shape[0], np.float32)
+        for x in range(width):
+            mean, variance = reference_window(reference, x, y, window, weights, values)
+            for s in range(costs.shape[0]):
+                costs[s, y, x] = plane_cost(
+                    np.float32(x), np.float32(y), planes[y, x, 0], planes[y, x, 1],
+                    planes[y, x, 2], sources, s, window, weights, values, mean,
+                    variance,
+                )  # fmt: skip
+
+
+@njit(cache=True, fastmath=True)
+def _view_cost(x, y, w, gx, gy, sources, s, window, weights, values, mean, variance,
+               geometric):  # fmt: skip
+    """The cost of a plane in a source, `OUTSIDE` where that does not see it."""
+    cost = plane_cost(
+        x, y, w, gx, gy, sources, s, window, weights, values, mean, variance
+    )
+    if geometric:
+        return geometric_cost(cost, x, y, w, sources, s)
+    return cost
+
+
+@njit(cache=True, fastmath=True)
+def _finest_step(x, y, w, sources):
+    """Inverse depth for a pixel of disparity, in the source where it is least."""
+    step = np.float32(1e30)
+    for s in range(sources.A.shape[0]):
+        step = min(step, inverse_depth_per_px(x, y, w, sources.A, sources.b, s))
+    return step
+
+
+@njit(cache=True, parallel=True, fastmath=True)
+def sweep(reference, K, planes, costs, sources, window, w_range, smoothness, seed,
+          number, color, geometric):  # fmt: skip
+    """Update the pixels of one colour of the checkerboard in place.
+
+    Each pixel takes the best of its own plane, those of eight neighbouring regions,
+    and random and perturbed ones, by the cost weighted over the sources plus the
+    roughness.
+
+    Args:
+        reference: Grey values, shape (H, W).
+        K: Its intrinsics.
+        planes: Shape (H, W, 3), updated.
+        costs: Shape (H, W), updated.
+        sources: The source views.
+        window: Where windows are sampled.
+        w_range: Least and greatest inverse depth.
+        smoothness: Weight of the roughness; 0 = none.
+        seed: Seed of the random planes.
+        number: Number of the sweep, from 1.
+        color: 0 or 1.
+        geometric: Whether the sources' depth maps count.
+    """
+    height, width = reference.shape
+    num_sources = sources.A.shape[0]
+    for row in prange(height):
+        y = np.int64(row)  # an unsigned number and a signed one would make a float
+        weights = np.empty(window.dx.shape[0], np.float32)
+        values = np.empty(window.dx.shape[0], np.float32)
+        states = np.empty((NUM_STATES, 3), np.float32)
+        trials = np.empty((NUM_TRIALS, 3), np.float32)
+        matrix = np.empty((NUM_STATES, num_sources), np.float32)
+        view_weights = np.empty(num_sources, np.float32)
+        near = np.zeros(NUM_NEIGHBORS, np.float32)
+        near_weights = np.zeros(NUM_NEIGHBORS, np.float32)
+        for x in range((y + color) % 2, width, 2):
+            mean, variance = reference_window(reference, x, y, window, weights, values)
+            fx, fy = np.float32(x), np.float32(y)
+            if smoothness > 0:
+                gather_neighbors(reference, planes, x, y, near, near_weights)
+            count = gather_states(x, y, planes, costs, w_range, K, states)
+            px_per_w = ONE / _finest_step(fx, fy, states[0, 0], sources)
+            best, best_cost = 0, np.float32(1e9)
+            for i in range(count):
+                # A single source has all the weight: what is rough needs no match.
+                if num_sources == 1 and best_cost <= smoothness * roughness(
+                    states[i], px_per_w, near, near_weights
+                ):
+                    matrix[i, 0] = MAX_COST
+                    continue
+                twin = earlier_twin(states, i, px_per_w)
+                for s in range(num_sources):
+                    if twin >= 0:
+                        matrix[i, s] = matrix[twin, s]
+                    else:
+                        matrix[i, s] = _view_cost(
+                            fx, fy, states[i, 0], states[i, 1], states[i, 2], sources,
+                            s, window, weights, values, mean, variance, geometric,
+                        )  # fmt: skip
+                if num_sources == 1:
+                    cost = bounded_cost(matrix[i, 0], geometric)
+                    cost += smoothness * roughness(
+                        states[i], px_per_w, near, near_weights
+                    )
+                    best_cost = min(best_cost, cost)
+            weigh_views(matrix, count, number, view_weights)
+            main = np.argmax(view_weights)
+            w_per_px = inverse_depth_per_px(
+                fx, fy, states[0, 0], sources.A, sources.b, main
+            )
+            best_cost = np.float32(1e9)
+            for i in range(count):  # its own plane first: it wins ties
+                cost = smoothness * roughness(
+                    states[i], ONE / w_per_px, near, near_weights
+                )
+                for s in range(num_sources):
+                    cost += view_weights[s] * bounded_cost(matrix[i, s], geometric)
+                if cost < best_cost:
+                    best, best_cost = i, cost
+            plane = states[best]
+            w_per_px = inverse_depth_per_px(
+                fx, fy, plane[0], sources.A, sources.b, main
+            )
+            state = seeded_state(seed, y * width + x, number)
+            make_trials(plane, fx, fy, K, w_range, w_per_px, state, trials)
+            for i in range(NUM_TRIALS):
+                if not w_range[0] <= trials[i, 0] <= w_range[1]:
+                    continue
+                cost = smoothness * roughness(
+                    trials[i], ONE / w_per_px, near, near_weights
+                )
+                for s in range(num_sources):
+                    # What is dear already is not looked at in more sources.
+                    if view_weights[s] > LEAST_WEIGHT and cost < best_cost:
+                        match = _view_cost(
+                            fx, fy, trials[i, 0], trials[i, 1], trials[i, 2], sources,
+                            s, window, weights, values, mean, variance, geometric,
+                        )  # fmt: skip
+                        cost += view_weights[s] * bounded_cost(match, geometric)
+                if cost < best_cost:
+                    best_cost = cost
+                    plane = trials[i]
+            for i in range(3):
+                planes[y, x, i] = plane[i]
+            costs[y, x] = best_cost

@@ -1,5 +1,6 @@
 """Laws of the CPU PatchMatch, on an exact slanted plane seen by three cameras."""
 
+import dataclasses
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,12 @@ from numba import get_num_threads, set_num_threads
 from numpy.typing import NDArray
 
 from resdepth_colmap.config import StereoConfig
-from resdepth_colmap.matching.patch_match import MatchResult, MatchView, match_view
+from resdepth_colmap.matching.patch_match import (
+    MatchResult,
+    MatchView,
+    Surface,
+    match_view,
+)
 
 Array = NDArray[Any]
 
@@ -139,3 +145,83 @@ def test_a_range_of_three_powers_of_ten_still_finds_the_plane() -> None:
     sources = [_view(0.25), _view(-0.2, 0.1)]
     result = match_view(_view(0.0), sources, (0.05, 100.0), CONFIG)
     assert np.median(_inner(np.abs(result.depth - truth) / truth)) < 2e-3
+
+
+def _noisy(view: MatchView, contrast: float, seed: int) -> MatchView:
+    """The view with so weak a texture that the noise of 1 % hides the plane."""
+    noise = np.random.default_rng(seed).normal(0.0, 0.01, view.gray.shape)
+    gray = 0.5 + contrast * (view.gray - 0.5) + noise
+    return dataclasses.replace(view, gray=gray.astype(np.float32))
+
+
+def test_smoothness_decides_where_the_texture_is_as_weak_as_the_noise() -> None:
+    views = [_noisy(_view(x), 0.4, seed) for seed, x in enumerate((0.0, 0.25, -0.25))]
+    truth = _depth(_view(0.0).cam_from_world)
+    bad = {}
+    for smoothness in (0.0, 1.0):
+        config = StereoConfig(smoothness=smoothness)
+        result = match_view(views[0], views[1:], NEAR_FAR, config)
+        bad[smoothness] = np.mean(_inner(np.abs(result.depth - truth) / truth) > 0.02)
+    assert bad[1.0] < 0.5 * bad[0.0]
+
+
+def test_a_strip_that_no_source_sees_goes_on_as_its_surroundings_do() -> None:
+    truth = _depth(_view(0.0).cam_from_world)
+    right = {}
+    for smoothness in (0.0, 1.0):
+        config = StereoConfig(smoothness=smoothness)
+        result = match_view(_view(0.0), [_view(0.6)], NEAR_FAR, config)
+        unseen = np.all(result.source_costs == 1.0, axis=0)
+        assert np.mean(unseen[8:-8, :12]) > 0.8
+        right[smoothness] = np.mean(
+            (np.abs(result.depth - truth) / truth)[unseen] < 0.1
+        )
+    assert right[1.0] > 1.5 * right[0.0]
+
+
+def test_the_costs_of_the_sources_are_those_of_a_match_and_of_no_match() -> None:
+    seen, blind = _view(0.25), dataclasses.replace(_view(-0.25), gray=_gray_noise())
+    result = _match(seen, blind)
+    assert result.source_costs.shape == (2, HEIGHT, WIDTH)
+    assert np.median(_inner(result.source_costs[0])) < 0.05
+    assert np.median(_inner(result.source_costs[1])) > 0.5
+
+
+def _gray_noise() -> Array:
+    return np.random.default_rng(0).random((HEIGHT, WIDTH)).astype(np.float32)
+
+
+def _second_pass(source_depths: list[Array], *sources: MatchView) -> MatchResult:
+    """The geometric pass, from a photometric map that is wrong in a block."""
+    truth = _depth(_view(0.0).cam_from_world).astype(np.float32)
+    depth = truth.copy()
+    depth[20:40, 30:50] = 1.6
+    normals = np.zeros((HEIGHT, WIDTH, 3), np.float32)
+    normals[:] = PLANE / np.linalg.norm(PLANE)
+    start = Surface(depth=depth, normals=normals)
+    flat = np.full((HEIGHT, WIDTH), 0.5, np.float32)
+    views = [dataclasses.replace(v, gray=flat) for v in (_view(0.0), *sources)]
+    return match_view(
+        *(views[0], views[1:], NEAR_FAR, StereoConfig(smoothness=0.0)),
+        start=start,
+        source_depths=source_depths,
+    )
+
+
+def test_without_any_texture_the_maps_of_the_sources_decide() -> None:
+    sources = [_view(0.25), _view(-0.2, 0.1)]
+    depths = [_depth(view.cam_from_world).astype(np.float32) for view in sources]
+    result = _second_pass(depths, *sources)
+    truth = _depth(_view(0.0).cam_from_world)
+    block = (np.abs(result.depth - truth) / truth)[20:40, 30:50]
+    assert np.mean(block < 0.02) > 0.6
+
+
+def test_empty_maps_of_the_sources_decide_nothing() -> None:
+    sources = [_view(0.25), _view(-0.2, 0.1)]
+    depths = [np.zeros((HEIGHT, WIDTH), np.float32) for _ in sources]
+    result = _second_pass(depths, *sources)
+    assert np.all(np.isfinite(result.depth))
+    truth = _depth(_view(0.0).cam_from_world)
+    block = (np.abs(result.depth - truth) / truth)[20:40, 30:50]
+    assert np.mean(block < 0.02) < 0.1
