@@ -3,7 +3,7 @@
 import contextlib
 import shutil
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -70,6 +70,14 @@ class OpenPage:
         """What an element looks like now, as PNG."""
         self.page.locator(selector).scroll_into_view_if_needed()
         shot: bytes = self.page.locator(selector).screenshot()
+        return shot
+
+    def picture_once(self, selector: str, is_right: Callable[[bytes], bool]) -> bytes:
+        """What an element looks like once it looks right: drawing takes a while."""
+        end = time.monotonic() + _TIMEOUT_S
+        while not is_right(shot := self.picture(selector)):
+            assert time.monotonic() < end, f"{selector} never looked right"
+            self.page.wait_for_timeout(50)
         return shot
 
     def values(self) -> dict[str, str]:

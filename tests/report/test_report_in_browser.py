@@ -158,19 +158,15 @@ def test_the_cloud_is_drawn_turned_and_switched(opened: Opener) -> None:
     report.wait_until(
         "document.getElementById('cloud-hint').textContent.includes('points are')"
     )
-    report.page.wait_for_timeout(300)
-    first = report.picture(canvas)
-    before, after = shares_of(first)
-    assert after > 0.02 and before < 0.001
+    first = report.picture_once(canvas, lambda shot: shares_of(shot)[1] > 0.02)
+    assert shares_of(first)[0] < 0.001
     report.page.locator(canvas).focus()
     report.page.keyboard.press("ArrowLeft")
     report.page.keyboard.press("ArrowLeft")
-    report.page.wait_for_timeout(300)
-    assert report.picture(canvas) != first
+    report.picture_once(canvas, lambda shot: shot != first)
     report.page.keyboard.press("b")
-    report.page.wait_for_timeout(600)
-    before, after = shares_of(report.picture(canvas))
-    assert before > 0.02 and after < 0.001
+    switched = report.picture_once(canvas, lambda shot: shares_of(shot)[0] > 0.02)
+    assert shares_of(switched)[1] < 0.001
 
 
 def test_it_is_dark_where_the_system_is_and_as_the_button_says(opened: Opener) -> None:

@@ -21,6 +21,7 @@ async function showImage(index) {
   const image = report.images[index];
   Object.assign(stage, { index, image, maps: null, probe: null });
   byId("stage").style.setProperty("--aspect", image.mapWidth / image.mapHeight);
+  byId("stage").classList.toggle("portrait", image.mapHeight > image.mapWidth);
   byId("image-name").textContent = image.name;
   byId("photo").src = blockImageUrl(`image-${index}-photo`);
   byId("photo").alt = `Photo ${image.name}`;
