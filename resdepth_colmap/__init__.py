@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from resdepth_colmap.pipeline.refine_workspace import refine_workspace
     from resdepth_colmap.pipeline.run import run_refine
     from resdepth_colmap.pipeline.run_config import RunConfig
+    from resdepth_colmap.report.refine_and_report import refine_and_report
     from resdepth_colmap.scene import Camera, Scene, View
 
     __version__: str
@@ -37,6 +38,7 @@ __all__ = [
     "fuse_workspace",
     "load_weights",
     "open_workspace",
+    "refine_and_report",
     "refine_view",
     "refine_workspace",
     "run_refine",
@@ -57,6 +59,7 @@ _MODULE_OF = {
     "fuse_workspace": "pipeline.fuse",
     "load_weights": "network.weights",
     "open_workspace": "io.workspace",
+    "refine_and_report": "report.refine_and_report",
     "refine_view": "pipeline.refine",
     "refine_workspace": "pipeline.refine_workspace",
     "run_refine": "pipeline.run",
