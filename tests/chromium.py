@@ -15,7 +15,7 @@ _SOFTWARE_GL = (
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
 )
-_TIMEOUT_S = 60  # a busy machine draws slowly
+_TIMEOUT_S = 120  # a busy machine draws slowly
 
 
 @contextlib.contextmanager
