@@ -17,6 +17,7 @@ COMMANDS = (
     "export",
     "info",
     "report",
+    "compare",
     "evaluate",
     "demo",
     "synthesize",

@@ -102,7 +102,7 @@ def cloud_scores(
         tolerances=config.tolerances,
         accuracy=accuracy,
         completeness=completeness,
-        f1=tuple(map(_f1, accuracy, completeness)),
+        f1=tuple(map(f1_score, accuracy, completeness)),
         num_points=len(points),
         num_scan_points=num_scan_points,
     )
@@ -163,7 +163,8 @@ def _inverse(motion: Points) -> Points:
     return inverse
 
 
-def _f1(accuracy: float, completeness: float) -> float:
+def f1_score(accuracy: float, completeness: float) -> float:
+    """Harmonic mean of both, in 0..1; 0 if both are 0."""
     total = accuracy + completeness
     return 2 * accuracy * completeness / total if total > 0 else 0.0
 

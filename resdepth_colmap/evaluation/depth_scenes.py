@@ -26,7 +26,7 @@ def scene_sources(paths: Sequence[Path]) -> tuple[SceneSource, ...]:
         source too: reading it says what is wrong.
     """
     folders = list(dict.fromkeys(f for path in paths for f in _scenes_at(path)))
-    names = _names(folders)
+    names = distinct_names(folders)
     return tuple(
         SceneSource(name=name, read=functools.partial(_reader(folder), folder))
         for name, folder in zip(names, folders, strict=True)
@@ -47,7 +47,7 @@ def _reader(path: Path) -> Callable[[Path, CaseOptions], Sequence[LazyCase]]:
     return read_middlebury_cases if is_middlebury_scene(path) else read_workspace_cases
 
 
-def _names(folders: Sequence[Path]) -> list[str]:
+def distinct_names(folders: Sequence[Path]) -> list[str]:
     """The names of the folders, with as many of their parents as tells them apart."""
     parts = [folder.absolute().parts for folder in folders]
     length = 1

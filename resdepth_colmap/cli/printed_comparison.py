@@ -1,0 +1,129 @@
+"""What `compare` prints of a workspace."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import click
+
+from resdepth_colmap.cli.printed import show_line, show_table
+
+_FUSERS = {"open3d": "ours", "colmap": "COLMAP"}
+
+
+def show_workspace(name: str, found: Mapping[str, Any]) -> None:
+    """All that was found out, as tables.
+
+    Args:
+        name: Of the workspace.
+        found: `Comparison.to_mapping()`.
+    """
+    show_line("workspace", f"{name} ({len(found['views'])} views compared)")
+    for arm, facts in found["arms"].items():
+        normals = f"normals: {facts['normals']}"
+        show_line(arm, f"{facts['kind']} maps, {normals}")
+    for fuser, settings in found["fusion"].items():
+        said = ", ".join(f"{key} {value:g}" for key, value in settings.items())
+        show_line(f"fusion {fuser}", said)
+    if found["truth"] is not None:
+        truth = {k: v for k, v in found["truth"].items() if k != "kind"}
+        said = ", ".join(f"{key} {value:,}" for key, value in truth.items())
+        show_line("truth", f"{found['truth']['kind']}: {said}")
+    for note in found["notes"]:
+        show_line("note", note)
+    _show_clouds(found["clouds"])
+    _show_measures(found)
+
+
+def _show_clouds(clouds: Mapping[str, Any]) -> None:
+    from rich.table import Table
+
+    table = Table(title="clouds")
+    for header in ("fusion", "arm"):
+        table.add_column(header)
+    for header in ("points", "within", "accuracy", "complete", "F1"):
+        table.add_column(header, justify="right")
+    notes: dict[str, list[str]] = {}
+    for fuser, arms in clouds.items():
+        for arm, cloud in arms.items():
+            for row in _cloud_rows(cloud):
+                table.add_row(_FUSERS[fuser], arm, *row)
+            if cloud["note"]:
+                said = f"{_FUSERS[fuser]}: {cloud['note']}"
+                notes.setdefault(said, []).append(arm)
+        table.add_section()
+    show_table(table)
+    for said, of_arms in notes.items():
+        show_line("note", f"{', '.join(of_arms)}: {said}.")
+
+
+def _cloud_rows(cloud: Mapping[str, Any]) -> list[list[str]]:
+    scores, number = cloud["scores"], cloud["num_points"]
+    points = "-" if number is None else f"{number:,}"
+    if scores is None:
+        return [[points, "-", "-", "-", "-"]]
+    keys = ("accuracy", "completeness", "f1")
+    return [
+        [
+            points,
+            f"{tolerance:.4g}",
+            *(f"{100 * scores[key][it]:.2f} %" for key in keys),
+        ]
+        for it, tolerance in enumerate(scores["tolerances"])
+    ]
+
+
+def _show_measures(found: Mapping[str, Any]) -> None:
+    from resdepth_colmap.evaluation.measures import MEASURES
+
+    arms = found["measures"]
+    measured = [
+        name for name in MEASURES if any(it[name] is not None for it in arms.values())
+    ]
+    _show_means(arms, measured)
+    for pair, differences in found["paired"].items():
+        _show_differences(pair, differences, measured)
+    width = max(map(len, measured)) + 2
+    for name in measured:
+        click.echo(f"{name:<{width}}{MEASURES[name]}")
+
+
+def _show_means(arms: Mapping[str, Any], measured: Sequence[str]) -> None:
+    from rich.table import Table
+
+    table = Table("measure, %", title="means over the views")
+    for arm in arms:
+        table.add_column(arm, justify="right")
+    for name in measured:
+        table.add_row(name, *(_percent(values[name]) for values in arms.values()))
+    show_table(table)
+
+
+def _show_differences(
+    pair: str, differences: Mapping[str, Any], measured: Sequence[str]
+) -> None:
+    from rich.table import Table
+
+    table = Table("points of 100", title=f"{pair}, view by view")
+    for header in ("mean", "95 %", "median", "better", "worse", "tiles"):
+        table.add_column(header, justify="right")
+    for name in measured:
+        views, tiles = differences[name]["views"], differences[name]["tiles"]
+        low, high = views["interval"] or (None, None)
+        table.add_row(
+            name,
+            _points(views["mean"]),
+            "-" if low is None else f"{_points(low)} {_points(high)}",
+            _points(views["median"]),
+            str(views["num_better"]),
+            str(views["num_worse"]),
+            f"{tiles['num_better']}:{tiles['num_worse']}",
+        )
+    show_table(table)
+
+
+def _percent(value: float | None) -> str:
+    return "-" if value is None else f"{100 * value:.1f}"
+
+
+def _points(value: float | None) -> str:
+    return "-" if value is None else f"{100 * value:+.1f}"
