@@ -91,11 +91,11 @@ class DepthTruth:
                 Without any, all scores are 0.
             progress: Is told how far it is.
         """
-        points = points[np.isfinite(points).all(axis=1)]
-        points = points[self._is_looked_at(points)]
+        whole = points[np.isfinite(points).all(axis=1)]
+        points = whole[self._is_looked_at(whole)]
         total = len(points) + len(self.points)
         with progress.stage("Scoring", total) as advance:
-            reached = completeness_levels(self.points, points, self.tolerances, advance)
+            reached = completeness_levels(self.points, whole, self.tolerances, advance)
             right = completeness_levels(points, self.points, self.tolerances, advance)
         places = range(len(self.tolerances))
         accuracy = tuple(0.0 for _ in places)

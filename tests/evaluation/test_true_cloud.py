@@ -59,6 +59,7 @@ def test_scores_are_those_of_nearest_points(truth: DepthTruth) -> None:
     expected = [float((nearest <= it).mean()) for it in truth.tolerances]
     assert scores.completeness == pytest.approx(expected, abs=1e-3)
     nearest, _ = cKDTree(truth.points).query(cloud)
+    assert scores.num_points > 0.9 * len(cloud)  # the others no true map looks at
     expected = [float((nearest <= it).mean()) for it in truth.tolerances]
     assert scores.accuracy == pytest.approx(expected, abs=0.03)  # a mean over voxels
 
