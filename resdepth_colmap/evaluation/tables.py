@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from resdepth_colmap.evaluation.cloud_tables import cloud_table
+from resdepth_colmap.evaluation.comparison_tables import comparison_table
 from resdepth_colmap.evaluation.markdown import HARDWARE as HARDWARE
 from resdepth_colmap.evaluation.markdown import (
     NOT_KNOWN,
@@ -145,6 +146,7 @@ DOCUMENTS: dict[str, dict[str, Renderer]] = {
         "refine": refine_table,
         "variants": variants_table,
         "cloud": cloud_table,
+        "compare": comparison_table,
         "stereo_memory": stereo_memory_table,
     },
 }
