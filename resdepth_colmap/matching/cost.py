@@ -13,6 +13,7 @@ from numba import njit
 
 MAX_COST = np.float32(2.0)  # COLMAP's kMaxCost: 1 - NCC of perfectly opposite patches
 OUTSIDE = np.float32(1.0)  # the source does not see the plane: neither good nor bad
+NUM_LEVELS = 3  # of blur: 0, 1 and 2 px, with windows of 1, 2 and 4 times the size
 MIN_VARIANCE = np.float32(1e-5)  # COLMAP: below it a patch has no texture
 ZERO, ONE, SMALL = np.float32(0), np.float32(1), np.float32(1e-3)
 
@@ -42,7 +43,8 @@ class Sources(NamedTuple):
     Attributes:
         A: Shape (S, 3, 3): a pixel lies at ``A (x, y, 1) + b inverse_depth``.
         b: Shape (S, 3).
-        pixels: Grey values of all images, one image after the other.
+        pixels: Grey values of all images, one image after the other, at each level of
+            blur, shape (NUM_LEVELS, pixels of all images).
         inverse_depths: Their inverse depth maps likewise, 0 = none; or empty.
         starts: Where each image starts, (S,).
         sizes: Width and height of each, (S, 2).
@@ -57,7 +59,26 @@ class Sources(NamedTuple):
 
 
 @njit(cache=True, fastmath=True)
-def reference_window(reference, x, y, window, weights, values):
+def reference_window(levels, x, y, window, weights, values):
+    """Bilateral weights of a window, at the first level of blur that has texture.
+
+    Where a window shows nothing, one of twice the size on a blurred image may: what the
+    coarse scales of ACMM are for (section 3.3), pixel by pixel.
+
+    Returns:
+        The level, and weighted mean and variance of the reference's grey values.
+    """
+    level = 0
+    mean, variance = _window_at(levels[0], x, y, ONE, window, weights, values)
+    while variance < MIN_VARIANCE and level < levels.shape[0] - 1:
+        level += 1
+        scale = np.float32(1 << level)
+        mean, variance = _window_at(levels[level], x, y, scale, window, weights, values)
+    return level, mean, variance
+
+
+@njit(cache=True, fastmath=True)
+def _window_at(reference, x, y, scale, window, weights, values):
     """Bilateral weights of a window (COLMAP, patch_match_cuda.cu), summing to 1.
 
     The weight of a grey value, exp(-a), is taken as (1 - a / 8)^8, which needs no call
@@ -75,8 +96,8 @@ def reference_window(reference, x, y, window, weights, values):
     color_factor = np.float32(-0.0625) / (window.sigma_color * window.sigma_color)
     total, mean, square = ZERO, ZERO, ZERO
     for k in range(window.dx.shape[0]):
-        xs = fx + window.dx[k]
-        ys = fy + window.dy[k]
+        xs = fx + scale * window.dx[k]
+        ys = fy + scale * window.dy[k]
         xs = xs if xs > ZERO else ZERO
         ys = ys if ys > ZERO else ZERO
         xs = xs if xs < x_last else x_last
@@ -101,13 +122,15 @@ def reference_window(reference, x, y, window, weights, values):
 
 
 @njit(cache=True, fastmath=True)
-def plane_cost(x, y, w, gx, gy, sources, s, window, weights, values, mean, variance):
+def plane_cost(x, y, w, gx, gy, sources, s, level, window, weights, values, mean,
+               variance):  # fmt: skip
     """1 - NCC of the reference's window and that of source s, in 0..2.
 
     `OUTSIDE` where the plane's centre is behind the source or out of its image,
     `MAX_COST` where there is no texture.
     """
-    A, b, pixels = sources.A, sources.b, sources.pixels
+    A, b, pixels = sources.A, sources.b, sources.pixels[level]
+    scale = np.float32(1 << level)
     width, height = sources.sizes[s, 0], sources.sizes[s, 1]
     start = np.uint64(sources.starts[s])
     u0 = A[s, 0, 0] * x + A[s, 0, 1] * y + A[s, 0, 2] + b[s, 0] * w
@@ -128,7 +151,7 @@ def plane_cost(x, y, w, gx, gy, sources, s, window, weights, values, mean, varia
     # Selects instead of min and max, and unsigned 32-bit indices, which need no test
     # for negative ones: LLVM then vectorises the loop with gathers (twice as fast).
     for k in range(window.dx.shape[0]):
-        dx, dy = window.dx[k], window.dy[k]
+        dx, dy = scale * window.dx[k], scale * window.dy[k]
         z = u2 + ux2 * dx + uy2 * dy
         z = z if z > SMALL else SMALL
         inverse = ONE / z

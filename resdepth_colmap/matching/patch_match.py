@@ -96,7 +96,8 @@ def match_view(
         raise ValueError(f"{depth_range=} but expected 0 < near < far.")
     from resdepth_colmap.matching import sweeps  # numba: slow import
 
-    gray = np.ascontiguousarray(reference.gray, np.float32)
+    gray = reference.gray
+    levels = _blurred(gray)
     K = reference.K.astype(np.float32)
     flat = _flat_sources(reference, sources, source_depths)
     window = _window(config)
@@ -107,7 +108,7 @@ def match_view(
         sweeps.random_planes(planes, K, w_range, config.seed)
     else:
         sweeps.planes_of(start.depth, start.normals, K, w_range, planes)
-    sweeps.match_costs(gray, planes, flat, window, source_costs)
+    sweeps.match_costs(levels, planes, flat, window, source_costs)
     costs = source_costs.mean(axis=0)
     geometric = source_depths is not None
     half = (config.num_iterations + 1) // 2
@@ -119,12 +120,12 @@ def match_view(
         smoothness = np.float32(config.smoothness if number > half else 0.0)
         for color in (0, 1):
             sweeps.sweep(
-                *(gray, K, planes, costs, flat, window, w_range, smoothness),
+                *(levels, K, planes, costs, flat, window, w_range, smoothness),
                 *(config.seed, number, color, geometric),
             )
         if on_sweep:
             on_sweep(number - first + 1, total)
-    sweeps.match_costs(gray, planes, flat, window, source_costs)
+    sweeps.match_costs(levels, planes, flat, window, source_costs)
     normals = np.zeros((*gray.shape, 3), np.float32)
     sweeps.normals_of(planes, K, normals)
     return MatchResult(
@@ -138,11 +139,13 @@ def _flat_sources(
     source_depths: Sequence[DepthMap] | None,
 ) -> "Sources":
     """The sources as the kernels take them."""
-    from resdepth_colmap.matching.cost import Sources
+    from resdepth_colmap.matching.cost import NUM_LEVELS, Sources
 
     sizes = np.array([source.gray.shape[::-1] for source in sources], np.int64)
     ends = np.cumsum(sizes.prod(axis=1))
-    pixels = np.concatenate([source.gray.ravel() for source in sources])
+    pixels = np.concatenate(
+        [_blurred(view.gray).reshape(NUM_LEVELS, -1) for view in sources], axis=1
+    )
     inverse = np.zeros(0, np.float32)
     if source_depths is not None:
         depths = np.concatenate([depth.ravel() for depth in source_depths])
@@ -151,11 +154,22 @@ def _flat_sources(
     return Sources(
         A=A,
         b=b,
-        pixels=pixels.astype(np.float32),
+        pixels=pixels,
         inverse_depths=inverse.astype(np.float32),
         starts=ends - sizes.prod(axis=1),
         sizes=sizes,
     )
+
+
+def _blurred(gray: GrayImage) -> FloatMap:
+    """The image at each level of blur: with 0, 1, 2 px."""
+    import cv2
+
+    from resdepth_colmap.matching.cost import NUM_LEVELS
+
+    sigmas = [2.0 ** (level - 1) for level in range(1, NUM_LEVELS)]
+    blurred = [cv2.GaussianBlur(gray, (0, 0), sigma) for sigma in sigmas]
+    return np.stack([gray, *blurred]).astype(np.float32)
 
 
 def _projections(

@@ -84,28 +84,30 @@ def normals_of(planes, K, normals):
 
 
 @njit(cache=True, parallel=True, fastmath=True)
-def match_costs(reference, planes, sources, window, costs):
+def match_costs(levels, planes, sources, window, costs):
     """1 - NCC of each pixel's plane in each source: costs, shape (S, H, W), 0..2."""
-    height, width = reference.shape
+    height, width = levels.shape[1:]
     for y in prange(height):
         weights = np.empty(window.dx.shape[0], np.float32)
         values = np.empty(window.dx.shape[0], np.float32)
         for x in range(width):
-            mean, variance = reference_window(reference, x, y, window, weights, values)
+            level, mean, variance = reference_window(
+                levels, x, y, window, weights, values
+            )
             for s in range(costs.shape[0]):
                 costs[s, y, x] = plane_cost(
                     np.float32(x), np.float32(y), planes[y, x, 0], planes[y, x, 1],
-                    planes[y, x, 2], sources, s, window, weights, values, mean,
+                    planes[y, x, 2], sources, s, level, window, weights, values, mean,
                     variance,
                 )  # fmt: skip
 
 
 @njit(cache=True, fastmath=True)
-def _view_cost(x, y, w, gx, gy, sources, s, window, weights, values, mean, variance,
-               geometric):  # fmt: skip
+def _view_cost(x, y, w, gx, gy, sources, s, level, window, weights, values, mean,
+               variance, geometric):  # fmt: skip
     """The cost of a plane in a source, `OUTSIDE` where that does not see it."""
     cost = plane_cost(
-        x, y, w, gx, gy, sources, s, window, weights, values, mean, variance
+        x, y, w, gx, gy, sources, s, level, window, weights, values, mean, variance
     )
     if geometric:
         return geometric_cost(cost, x, y, w, sources, s)
@@ -122,7 +124,7 @@ def _finest_step(x, y, w, sources):
 
 
 @njit(cache=True, parallel=True, fastmath=True)
-def sweep(reference, K, planes, costs, sources, window, w_range, smoothness, seed,
+def sweep(levels, K, planes, costs, sources, window, w_range, smoothness, seed,
           number, color, geometric):  # fmt: skip
     """Update the pixels of one colour of the checkerboard in place.
 
@@ -131,7 +133,7 @@ def sweep(reference, K, planes, costs, sources, window, w_range, smoothness, see
     roughness.
 
     Args:
-        reference: Grey values, shape (H, W).
+        levels: Grey values of the reference at each level of blur, (NUM_LEVELS, H, W).
         K: Its intrinsics.
         planes: Shape (H, W, 3), updated.
         costs: Shape (H, W), updated.
@@ -144,7 +146,7 @@ def sweep(reference, K, planes, costs, sources, window, w_range, smoothness, see
         color: 0 or 1.
         geometric: Whether the sources' depth maps count.
     """
-    height, width = reference.shape
+    height, width = levels.shape[1:]
     num_sources = sources.A.shape[0]
     for row in prange(height):
         y = np.int64(row)  # an unsigned number and a signed one would make a float
@@ -157,10 +159,12 @@ def sweep(reference, K, planes, costs, sources, window, w_range, smoothness, see
         near = np.zeros(NUM_NEIGHBORS, np.float32)
         near_weights = np.zeros(NUM_NEIGHBORS, np.float32)
         for x in range((y + color) % 2, width, 2):
-            mean, variance = reference_window(reference, x, y, window, weights, values)
+            level, mean, variance = reference_window(
+                levels, x, y, window, weights, values
+            )
             fx, fy = np.float32(x), np.float32(y)
             if smoothness > 0:
-                gather_neighbors(reference, planes, x, y, near, near_weights)
+                gather_neighbors(levels[0], planes, x, y, near, near_weights)
             count = gather_states(x, y, planes, costs, w_range, K, states)
             px_per_w = ONE / _finest_step(fx, fy, states[0, 0], sources)
             best, best_cost = 0, np.float32(1e9)
@@ -178,7 +182,8 @@ def sweep(reference, K, planes, costs, sources, window, w_range, smoothness, see
                     else:
                         matrix[i, s] = _view_cost(
                             fx, fy, states[i, 0], states[i, 1], states[i, 2], sources,
-                            s, window, weights, values, mean, variance, geometric,
+                            s, level, window, weights, values, mean, variance,
+                            geometric,
                         )  # fmt: skip
                 if num_sources == 1:
                     cost = bounded_cost(matrix[i, 0], geometric)
@@ -217,7 +222,8 @@ def sweep(reference, K, planes, costs, sources, window, w_range, smoothness, see
                     if view_weights[s] > LEAST_WEIGHT and cost < best_cost:
                         match = _view_cost(
                             fx, fy, trials[i, 0], trials[i, 1], trials[i, 2], sources,
-                            s, window, weights, values, mean, variance, geometric,
+                            s, level, window, weights, values, mean, variance,
+                            geometric,
                         )  # fmt: skip
                         cost += view_weights[s] * bounded_cost(match, geometric)
                 if cost < best_cost:

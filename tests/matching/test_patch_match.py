@@ -225,3 +225,18 @@ def test_empty_maps_of_the_sources_decide_nothing() -> None:
     truth = _depth(_view(0.0).cam_from_world)
     block = (np.abs(result.depth - truth) / truth)[20:40, 30:50]
     assert np.mean(block < 0.02) < 0.1
+
+
+def test_shading_too_weak_for_a_window_is_matched_with_a_wider_one() -> None:
+    views = []
+    for view in (_view(0.0), _view(0.3)):
+        depth = _depth(view.cam_from_world)
+        x = np.arange(WIDTH) - 39.5
+        along = depth * x / FOCAL - view.cam_from_world[0, 3]
+        shading = 0.5 + 0.006 * np.sin(5.0 * along)
+        views.append(dataclasses.replace(view, gray=shading.astype(np.float32)))
+    result = match_view(views[0], views[1:], NEAR_FAR, CONFIG)
+    truth = _depth(views[0].cam_from_world)
+    error = np.abs(result.depth - truth) / truth
+    assert np.var(views[0].gray[20:29, 30:39]) < 1e-5
+    assert np.median(error[8:-8, 20:-20]) < 0.03
