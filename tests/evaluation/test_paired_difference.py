@@ -17,7 +17,7 @@ Array = npt.NDArray[np.float64]
 def test_an_arm_does_not_differ_from_itself(values: Array) -> None:
     found = paired_difference(values, values)
     assert found.mean == found.median == 0
-    assert found.interval == (0, 0)
+    assert found.interval == (0.0, 0.0)
     assert found.num_better == found.num_worse == 0
 
 

@@ -44,10 +44,10 @@ def test_its_points_lie_on_the_surface_one_a_voxel(truth: DepthTruth) -> None:
 def test_the_truth_scores_100_and_nothing_scores_0(truth: DepthTruth) -> None:
     scores = truth.score(truth.points, SilentProgress())
     assert scores.accuracy == pytest.approx((1, 1))
-    assert scores.completeness == (1, 1)
+    assert scores.completeness == pytest.approx((1, 1))
     assert scores.f1 == pytest.approx((1, 1))
     nothing = truth.score(np.full((5, 3), np.nan, np.float32), SilentProgress())
-    assert nothing.accuracy == nothing.completeness == nothing.f1 == (0, 0)
+    assert nothing.accuracy == nothing.completeness == nothing.f1 == (0.0, 0.0)
 
 
 def test_scores_are_those_of_nearest_points(truth: DepthTruth) -> None:
