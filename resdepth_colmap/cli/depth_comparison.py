@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 NO_MATCHER_OPTIONS = (
     "max_image_size",
     "min_triangulation_angle",
-    "geom_consistency",
     "filter",
     "filter_min_ncc",
     "filter_min_triangulation_angle",

@@ -94,15 +94,41 @@ def _match(
         depth = match_by_colmap(views, depth_range, config)
         return Matching(depth=depth, cpu_s=0.0)  # it ran on the GPU
     _compile()
-    start = time.process_time()
-    depth = _match_here(views, depth_range, config)
-    return Matching(depth=depth, cpu_s=time.process_time() - start)
+    return _match_here(views, depth_range, config)
 
 
 def _match_here(
     views: Sequence[MatchView], depth_range: tuple[float, float], config: StereoConfig
-) -> DepthMap:
-    return match_view(views[0], views[1:], depth_range, config).depth
+) -> Matching:
+    """Match the first view, in both passes unless `geom_consistency` is off.
+
+    The photometric maps of the sources, which the geometric pass needs, count for the
+    sources and not for this view, as in a workspace, where each is made once.
+    """
+    start = time.process_time()
+    found = match_view(views[0], views[1:], depth_range, config)
+    cpu_s = time.process_time() - start
+    if config.geom_consistency:
+        source_depths = _source_depths(views, depth_range, config)
+        start = time.process_time()
+        found = match_view(
+            *(views[0], views[1:], depth_range, config),
+            start=found,
+            source_depths=source_depths,
+        )
+        cpu_s += time.process_time() - start
+    return Matching(depth=found.depth, cpu_s=cpu_s)
+
+
+def _source_depths(
+    views: Sequence[MatchView], depth_range: tuple[float, float], config: StereoConfig
+) -> list[DepthMap]:
+    """Photometric depth of every view but the first, each from all the others."""
+    found = []
+    for index in range(1, len(views)):
+        others = [*views[:index], *views[index + 1 :]]
+        found.append(match_view(views[index], others, depth_range, config).depth)
+    return found
 
 
 @functools.cache

@@ -138,3 +138,17 @@ def test_names_in_the_cache_are_names_of_files() -> None:
     )
     assert ours == "a_gr_e-x_y.png-cpu"
     assert theirs != ours
+
+
+def test_the_geometric_pass_is_run_unless_it_is_switched_off() -> None:
+    found = {}
+    for passes, geometric in ((1, False), (2, True)):
+        config = StereoConfig(num_iterations=2, geom_consistency=geometric)
+        found[passes] = initial_depth("scene", case(), StereoBackend.CPU, config)
+    right = {
+        passes: np.mean(np.abs(it.depth / found[2].depth - 1) < 1e-6)
+        for passes, it in found.items()
+    }
+    assert right[1] < 0.9
+    assert found[2].cpu_s is not None
+    assert found[2].cpu_s > 0
