@@ -19,6 +19,8 @@ from resdepth_colmap.scene import DepthMap, FloatMap, GrayImage, Matrix, NormalM
 if TYPE_CHECKING:
     from resdepth_colmap.matching.cost import Sources, Window
 
+METHOD = 2  # raised when the same input gives other maps: then old ones are made anew
+
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class MatchView:

@@ -10,6 +10,7 @@ from resdepth_colmap.config import StereoConfig
 from resdepth_colmap.io.masks import mask_file
 from resdepth_colmap.io.output import read_record, write_record
 from resdepth_colmap.io.workspace import Workspace
+from resdepth_colmap.matching.patch_match import METHOD
 from resdepth_colmap.pipeline.stereo_plan import StereoPlan
 from resdepth_colmap.scene import Scene
 
@@ -139,7 +140,8 @@ class Fingerprints:
             idle.append("write_consistency_graph")
         if kind == PHOTOMETRIC:
             idle += [name for name in options if name.startswith("geom_consistency")]
-        return {name: options[name] for name in options if name not in idle}
+        deciding = {name: options[name] for name in options if name not in idle}
+        return {"method": METHOD, **deciding}
 
 
 def _key(name: str, kind: str) -> str:

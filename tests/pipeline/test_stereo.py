@@ -18,7 +18,7 @@ from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.io.depth_map import read_depth_map, write_depth_map
 from resdepth_colmap.io.model import read_scene
 from resdepth_colmap.io.workspace import Workspace, open_workspace
-from resdepth_colmap.pipeline import stereo_passes
+from resdepth_colmap.pipeline import stereo_ledger, stereo_passes
 from resdepth_colmap.pipeline.progress import Advance, SilentProgress
 from resdepth_colmap.pipeline.stereo import (
     StereoReport,
@@ -160,6 +160,15 @@ def test_another_filter_does_the_second_pass_only(
     assert all(call.start is not None for call in matcher.calls)
     matcher.calls.clear()
     assert match(folder, filter_min_ncc=0.5, cache_size=1.0).matched == ()
+
+
+def test_our_own_maps_are_made_anew_by_a_matcher_that_has_changed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = plane_folder(tmp_path, kinds=())
+    match(folder)
+    monkeypatch.setattr(stereo_ledger, "METHOD", -1)
+    assert set(match(folder).matched) == set(NAMES)
 
 
 def test_a_changed_image_is_matched_again_with_all_that_look_at_it(
