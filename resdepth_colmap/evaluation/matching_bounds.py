@@ -63,8 +63,8 @@ def count_evaluations(
     count = np.zeros(1, np.int64)
     kernel, original = counting_sweep(), sweeps.sweep
 
-    def counted(reference, K, planes, costs, sources, *rest):
-        kernel(reference, K, planes, costs, CountedSources(*sources, count), *rest)
+    def counted(levels, K, planes, costs, sources, *rest):
+        kernel(levels, K, planes, costs, CountedSources(*sources, count), *rest)
 
     # The matcher looks its kernel up in the module at each call.
     setattr(sweeps, "sweep", counted)  # noqa: B010 (mypy wants a kernel there)
@@ -77,30 +77,32 @@ def count_evaluations(
 
 
 @njit(cache=True, fastmath=True)
-def _repeated_costs(reference, sources, window, weights, values, num_calls):
-    middle = reference.shape[0] // 2
+def _repeated_costs(levels, sources, window, weights, values, num_calls):
+    middle = levels.shape[1] // 2
     x = np.float32(middle)
-    mean, variance = reference_window(
-        reference, middle, middle, window, weights, values
+    level, mean, variance = reference_window(
+        levels, middle, middle, window, weights, values
     )
     total = np.float32(0)
     for i in range(num_calls):
         w = np.float32(0.25) + np.float32(1e-3) * np.float32(i % 16)
         total += plane_cost(
-            x, x, w, np.float32(1e-4), np.float32(1e-4), sources, 0, window, weights,
-            values, mean, variance,
+            x, x, w, np.float32(1e-4), np.float32(1e-4), sources, 0, level, window,
+            weights, values, mean, variance,
         )  # fmt: skip
     return total
 
 
 @njit(cache=True, fastmath=True)
-def _repeated_windows(reference, window, weights, values, num_calls):
-    middle = reference.shape[0] // 2
+def _repeated_windows(levels, window, weights, values, num_calls):
+    middle = levels.shape[1] // 2
     total = np.float32(0)
     for i in range(num_calls):
         x = middle + i % 4
-        mean, variance = reference_window(reference, x, middle, window, weights, values)
-        total += mean + variance
+        level, mean, variance = reference_window(
+            levels, x, middle, window, weights, values
+        )
+        total += level + mean + variance
     return total
 
 
@@ -118,14 +120,15 @@ def seconds_in_cache(config: StereoConfig) -> tuple[float, float]:
     source = MatchView(gray=gray, K=K, cam_from_world=pose)
     flat = patch_match._flat_sources(reference, [source], None)
     window = patch_match._window(config)
+    levels = patch_match._blurred(gray)
     weights = np.empty(len(window.dx), np.float32)
     values = np.empty(len(window.dx), np.float32)
 
     def costs(number):
-        _repeated_costs(gray, flat, window, weights, values, number)
+        _repeated_costs(levels, flat, window, weights, values, number)
 
     def windows(number):
-        _repeated_windows(gray, window, weights, values, number)
+        _repeated_windows(levels, window, weights, values, number)
 
     return _seconds_a_call(costs), _seconds_a_call(windows)
 

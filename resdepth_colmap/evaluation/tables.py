@@ -18,6 +18,7 @@ from resdepth_colmap.evaluation.markdown import (
     number,
     percent,
 )
+from resdepth_colmap.evaluation.matching_tables import matching_table
 from resdepth_colmap.evaluation.variant_tables import variants_table
 
 DEPTHS = {"unfiltered": "unfiltered", "median": "5 x 5 median", "refined": "refined"}
@@ -146,6 +147,7 @@ DOCUMENTS: dict[str, dict[str, Renderer]] = {
         "refine": refine_table,
         "variants": variants_table,
         "cloud": cloud_table,
+        "matching": matching_table,
         "compare": comparison_table,
         "stereo_memory": stereo_memory_table,
     },

@@ -34,6 +34,13 @@ def test_each_source_shows_the_noise_of_the_plane_where_it_is_seen(
 
 
 @pytest.mark.slow
+def test_window_costs_take_time_wherever_the_data_lie() -> None:
+    from resdepth_colmap.evaluation.matching_bounds import seconds_in_cache
+
+    assert all(0 < seconds < 1e-4 for seconds in seconds_in_cache(StereoConfig()))
+
+
+@pytest.mark.slow
 def test_no_more_planes_are_counted_than_the_method_can_look_at() -> None:
     from resdepth_colmap.evaluation.matching_bounds import count_evaluations
     from resdepth_colmap.matching.perturbation import NUM_TRIALS

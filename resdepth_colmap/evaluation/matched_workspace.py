@@ -1,0 +1,133 @@
+"""Workspaces that only the matcher's measurements write to, and what matching costs.
+
+They share images, model and truth with a workspace that stays as it is, and are kept,
+so that finished maps are not made again.
+"""
+
+import dataclasses
+import hashlib
+import json
+import shutil
+import time
+from collections.abc import Mapping
+from pathlib import Path
+
+import resdepth_colmap.matching
+from resdepth_colmap.config import StereoBackend, StereoConfig
+from resdepth_colmap.io.files import write_whole
+from resdepth_colmap.io.model import read_scene
+from resdepth_colmap.io.patch_match_cfg import (
+    SourceSpec,
+    write_fusion_cfg,
+    write_patch_match_cfg,
+)
+from resdepth_colmap.io.workspace import Workspace, open_workspace
+from resdepth_colmap.pipeline.progress import Progress, SilentProgress
+from resdepth_colmap.pipeline.stereo import stereo_workspace
+from resdepth_colmap.pipeline.stereo_warm_up import warm_up
+from resdepth_colmap.scene import Scene
+
+SHARED = ("images", "sparse", "ground_truth")
+COSTS_NAME = "cpu_seconds.json"
+_HASH_LENGTH = 8
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class MatchedWorkspace:
+    """A workspace of our own.
+
+    Attributes:
+        path: Its folder.
+        workspace: The same, opened.
+        scene: Its views.
+    """
+
+    path: Path
+    workspace: Workspace
+    scene: Scene
+
+    def match(
+        self,
+        label: str,
+        sources: Mapping[str, SourceSpec],
+        config: StereoConfig,
+        progress: Progress | None = None,
+    ) -> float | None:
+        """Make the maps that are not there yet.
+
+        Compiling is not counted. A run that went on from an interrupted one tells the
+        seconds of the images that were left.
+
+        Args:
+            label: What the seconds are kept under.
+            sources: The images to match, and their sources.
+            config: Options of the matcher.
+            progress: Is told how far it is.
+
+        Returns:
+            Processor seconds of all threads, a matched image; None if not known.
+
+        Raises:
+            WorkspaceError: If an image cannot be matched.
+        """
+        write_patch_match_cfg(self.workspace.stereo_path / "patch-match.cfg", sources)
+        warm_up(config)
+        start = time.process_time()
+        report = stereo_workspace(
+            self.workspace,
+            self.scene,
+            config,
+            StereoBackend.CPU,
+            progress=progress or SilentProgress(),
+        )
+        cpu_s = time.process_time() - start
+        path = self.path / COSTS_NAME
+        costs = json.loads(path.read_text("utf-8")) if path.is_file() else {}
+        if report.matched:
+            costs[label] = cpu_s / len(report.matched)
+            write_whole(path, json.dumps(costs, indent=2).encode())
+        seconds: float | None = costs.get(label)
+        return seconds
+
+
+def matched_workspace(original: Path, path: Path) -> MatchedWorkspace:
+    """A workspace that shares all but maps with another one.
+
+    Args:
+        original: A dense workspace; nothing is written to it.
+        path: Where ours is, or will be.
+
+    Raises:
+        WorkspaceError: If there is no workspace.
+    """
+    found = open_workspace(original).path
+    path.mkdir(parents=True, exist_ok=True)
+    for name in SHARED:
+        if (found / name).exists() and not (path / name).exists():
+            (path / name).symlink_to((found / name).resolve())
+    (path / "stereo").mkdir(exist_ok=True)
+    workspace = open_workspace(path)
+    scene = read_scene(workspace.sparse_path, workspace.images_path, workspace.path)
+    write_fusion_cfg(
+        workspace.stereo_path / "fusion.cfg", [view.name for view in scene.views]
+    )
+    return MatchedWorkspace(path=path, workspace=workspace, scene=scene)
+
+
+def copied_maps(source: MatchedWorkspace, path: Path) -> MatchedWorkspace:
+    """Another workspace of the same images that begins with the same maps."""
+    if not (path / "stereo").is_dir():
+        partial = path / "partial"
+        shutil.rmtree(partial, ignore_errors=True)
+        shutil.copytree(source.workspace.stereo_path, partial)
+        partial.rename(path / "stereo")
+    return matched_workspace(source.path, path)
+
+
+def matcher_hash() -> str:
+    """A name for the matcher as it is: a hash of its source."""
+    digest = hashlib.sha256()
+    for folder in resdepth_colmap.matching.__path__:
+        for file in sorted(Path(folder).glob("*.py")):
+            digest.update(file.read_bytes())
+    return digest.hexdigest()[:_HASH_LENGTH]

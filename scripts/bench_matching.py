@@ -1,0 +1,70 @@
+"""Measure how right the CPU PatchMatch is, and how fast.
+
+    python scripts/bench_matching.py [--only PART ...] [--cache FOLDER] [--data FOLDER]
+
+Parts: meeting_room and plant against COLMAP's own maps, middlebury and rendered against
+the truth, speed on noise. Maps are made by the stage `stereo` with default options, in
+workspaces of their own in the cache; finished ones are not made again while the matcher
+is the same. One thread matches; processor seconds are told, which other jobs change
+little. Each part goes to docs/measurements/matching.json when it is done; then
+`python scripts/make_tables.py` puts the figures into the documents.
+"""
+
+import argparse
+import datetime
+import json
+import logging
+import os
+from pathlib import Path
+
+from resdepth_colmap.config import StereoConfig
+from resdepth_colmap.evaluation.matched_workspace import matcher_hash
+from resdepth_colmap.evaluation.matching_parts import PARTS, Folders, rounded
+from resdepth_colmap.evaluation.matching_tables import matching_table
+from resdepth_colmap.pipeline.versions import versions
+
+REPOSITORY = Path(__file__).resolve().parents[1]
+RESULT = REPOSITORY / "docs" / "measurements" / "matching.json"
+DATA = Path(os.environ.get("RESDEPTH_DATA", REPOSITORY.parent / "shared" / "data"))
+CACHE = REPOSITORY / "build" / "matching"
+
+
+def main() -> None:
+    """Read the command line, measure, write and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--only", choices=PARTS, nargs="+", default=list(PARTS))
+    parser.add_argument("--data", type=Path, default=DATA, help="the real data")
+    parser.add_argument("--cache", type=Path, default=CACHE, help="maps are kept there")
+    parser.add_argument("--output", type=Path, default=RESULT)
+    arguments = parser.parse_args()
+    output: Path = arguments.output
+    logging.basicConfig(level=logging.INFO, format="%(message)s")
+    import numba
+
+    from resdepth_colmap.matching import sweeps  # noqa: F401 (the threading layer)
+
+    numba.set_num_threads(1)
+    matcher = matcher_hash()
+    folders = Folders(data=arguments.data, cache=arguments.cache / matcher)
+    for name in arguments.only:
+        measured = json.loads(output.read_text("utf-8")) if output.exists() else {}
+        part = rounded(PARTS[name](folders))
+        measured[name] = {"date": today(), "matcher": matcher, **part}
+        measured |= {
+            "command": "python scripts/bench_matching.py",
+            "date": today(),
+            "versions": versions(),
+            "options": StereoConfig().to_mapping(),
+        }
+        output.parent.mkdir(parents=True, exist_ok=True)
+        output.write_text(json.dumps(measured, indent=2) + "\n", "utf-8")
+    print(matching_table(json.loads(output.read_text("utf-8"))))
+
+
+def today() -> str:
+    """The date, as documents have it."""
+    return datetime.datetime.now(datetime.UTC).date().isoformat()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,129 @@
+"""Laws of the workspaces that measurements write to, and of what is measured there."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fake_matcher import FakeMatcher, installed
+from planes import NAMES, write_plane_workspace
+
+from resdepth_colmap.config import StereoConfig
+from resdepth_colmap.evaluation import matched_workspace as module
+from resdepth_colmap.evaluation.map_agreement import shares_within
+from resdepth_colmap.evaluation.matched_workspace import (
+    MatchedWorkspace,
+    copied_maps,
+    matched_workspace,
+    matcher_hash,
+)
+from resdepth_colmap.evaluation.matching_parts import (
+    Folders,
+    measure_meeting_room,
+    stretched_range,
+)
+from resdepth_colmap.io.depth_map import read_depth_map
+from resdepth_colmap.io.patch_match_cfg import SourceKind, SourceSpec
+
+ALL = SourceSpec(kind=SourceKind.ALL)
+FIRST = StereoConfig(geom_consistency=False, filter=False)
+
+
+@pytest.fixture(autouse=True)
+def matcher(monkeypatch: pytest.MonkeyPatch) -> FakeMatcher:
+    monkeypatch.setattr(module, "warm_up", lambda _: None)
+    return installed(monkeypatch)
+
+
+@pytest.fixture
+def matched(tmp_path: Path) -> MatchedWorkspace:
+    write_plane_workspace(tmp_path / "scene", kinds=("photometric",))
+    return matched_workspace(tmp_path / "scene", tmp_path / "cache" / "scene")
+
+
+def files(folder: Path) -> dict[str, int]:
+    return {
+        str(path.relative_to(folder)): path.stat().st_mtime_ns
+        for path in folder.rglob("*")
+        if path.is_file()
+    }
+
+
+def test_the_original_is_never_written_to(tmp_path: Path) -> None:
+    write_plane_workspace(tmp_path / "scene", kinds=("photometric",))
+    before = files(tmp_path / "scene")
+    matched = matched_workspace(tmp_path / "scene", tmp_path / "cache")
+    matched.match("photometric", dict.fromkeys(NAMES, ALL), FIRST)
+    assert files(tmp_path / "scene") == before
+    assert matched.workspace.depth_map_path(NAMES[0], "photometric").is_file()
+
+
+def test_finished_maps_are_not_made_again_and_their_seconds_are_kept(
+    matched: MatchedWorkspace, matcher: FakeMatcher
+) -> None:
+    sources = dict.fromkeys(NAMES, ALL)
+    assert matched.match("first", sources, FIRST) is not None
+    seconds = matched.match("first", sources, FIRST)
+    assert len(matcher.calls) == len(NAMES)
+    again = matched_workspace(matched.path, matched.path)
+    assert again.match("first", sources, FIRST) == seconds
+    assert len(matcher.calls) == len(NAMES)
+
+
+def test_what_was_never_measured_has_no_seconds(matched: MatchedWorkspace) -> None:
+    sources = dict.fromkeys(NAMES, ALL)
+    matched.match("first", sources, FIRST)
+    assert matched.match("other", sources, FIRST) is None
+
+
+def test_the_second_pass_takes_the_maps_of_the_first_and_only_the_images_asked_for(
+    matched: MatchedWorkspace, matcher: FakeMatcher
+) -> None:
+    matched.match("first", dict.fromkeys(NAMES, ALL), FIRST)
+    matched.match("second", {NAMES[0]: ALL}, StereoConfig(filter=False))
+    starts = [call.start is not None for call in matcher.calls]
+    assert starts == [False] * len(NAMES) + [True]
+    assert all(depth.all() for depth in matcher.calls[-1].source_depths or [])
+
+
+def test_a_copy_begins_with_the_same_maps_and_leaves_them_alone(
+    matched: MatchedWorkspace, matcher: FakeMatcher, tmp_path: Path
+) -> None:
+    sources = dict.fromkeys(NAMES, ALL)
+    matched.match("first", sources, FIRST)
+    before = files(matched.path / "stereo" / "depth_maps")
+    copy = copied_maps(matched, tmp_path / "copy")
+    copy.match("filtered", sources, StereoConfig())
+    assert len(matcher.calls) == 2 * len(NAMES)  # no photometric pass again
+    assert copy.workspace.depth_map_path(NAMES[0], "geometric").is_file()
+    assert files(matched.path / "stereo" / "depth_maps") == before
+
+
+def test_agreement_is_counted_where_maps_of_colmap_confirm_each_other(
+    tmp_path: Path,
+) -> None:
+    write_plane_workspace(tmp_path / "meeting_room", kinds=("photometric",))
+    result = measure_meeting_room(Folders(data=tmp_path, cache=tmp_path / "cache"))
+    assert list(result["maps"]) == list(NAMES)
+    colmap = read_depth_map(
+        tmp_path / f"meeting_room/stereo/depth_maps/{NAMES[0]}.photometric.bin"
+    )
+    entry = result["maps"][NAMES[0]]
+    assert 0.5 < entry["pixels"] <= 1
+    # The fake matcher finds a depth of 4 everywhere.
+    flat = np.full_like(colmap, 4)
+    everywhere = shares_within(flat, colmap, colmap > 0, (0.05,))
+    assert entry["geometric"]["0.05"] == pytest.approx(everywhere["0.05"], abs=0.2)
+    means = [maps["geometric"]["0.02"] for maps in result["maps"].values()]
+    assert result["mean"]["geometric"]["0.02"] == pytest.approx(np.mean(means))
+
+
+def test_a_range_of_maps_is_stretched_by_a_quarter() -> None:
+    depths = np.concatenate([np.zeros(50), np.linspace(2, 4, 1001)])
+    found = stretched_range({"a": depths.astype(np.float32)[np.newaxis]})
+    assert found["depth_min"] == pytest.approx(0.75 * 2.02)
+    assert found["depth_max"] == pytest.approx(1.25 * 3.98)
+
+
+def test_a_matcher_has_one_name() -> None:
+    assert matcher_hash() == matcher_hash()
+    assert matcher_hash().isalnum()
