@@ -40,7 +40,7 @@ class FakeMatcher:
         *,
         start: Surface | None = None,
         source_depths: Sequence[DepthMap] | None = None,
-        on_sweep: Callable[[int, int], None] | None = None,
+        on_step: Callable[[int, int], None] | None = None,
     ) -> MatchResult:
         call = Call(
             reference=reference,
@@ -51,8 +51,8 @@ class FakeMatcher:
         )
         self.calls.append(call)
         for number in range(1, config.num_iterations + 1):
-            if on_sweep:
-                on_sweep(number, config.num_iterations)
+            if on_step:
+                on_step(number, config.num_iterations)
         shape = reference.gray.shape
         normals = np.zeros((*shape, 3), np.float32)
         normals[..., 2] = -1

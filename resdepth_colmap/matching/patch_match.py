@@ -8,6 +8,7 @@ photographs do not, and visibility in the geometric pass (`visibility.py`).
 """
 
 import dataclasses
+import itertools
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
@@ -19,6 +20,8 @@ from resdepth_colmap.scene import DepthMap, FloatMap, GrayImage, Matrix, NormalM
 if TYPE_CHECKING:
     from resdepth_colmap.matching.cost import Sources, Window
 
+BAND_PIXELS = 400_000  # of all sources
+LEAST_ROWS = 16
 METHOD = 2  # raised when the same input gives other maps: then old ones are made anew
 
 
@@ -70,7 +73,7 @@ def match_view(
     *,
     start: Surface | None = None,
     source_depths: Sequence[DepthMap] | None = None,
-    on_sweep: Callable[[int, int], None] | None = None,
+    on_step: Callable[[int, int], None] | None = None,
 ) -> MatchResult:
     """Find depth and normal of every pixel of the reference view.
 
@@ -86,7 +89,8 @@ def match_view(
         start: The view's photometric maps; None = by chance.
         source_depths: Depth map of each source, of the size of its image, 0 = none;
             None = the photometric pass.
-        on_sweep: Called after each sweep with its number from 1 and their total.
+        on_step: Called after each fraction of a second's work with its number from 1
+            and their total; what it raises ends the matching.
 
     Raises:
         ValueError: Without sources, or for a depth range that is empty.
@@ -117,22 +121,32 @@ def match_view(
     total = half if geometric else config.num_iterations
     # The geometric pass goes on where the photometric one stopped.
     first = config.num_iterations + 1 if geometric else 1
+    bands = _bands(gray, len(sources))
+    step, num_steps = 0, total * 2 * len(bands)
     for number in range(first, first + total):
         # Smooth from the start, chance would freeze into islands.
         smoothness = np.float32(config.smoothness if number > half else 0.0)
-        for color in (0, 1):
+        for color, rows in itertools.product((0, 1), bands):
             sweeps.sweep(
                 *(levels, K, planes, costs, flat, window, w_range, smoothness),
-                *(config.seed, number, color, geometric),
+                *(config.seed, number, color, geometric, rows),
             )
-        if on_sweep:
-            on_sweep(number - first + 1, total)
+            step += 1
+            if on_step:
+                on_step(step, num_steps)
     sweeps.match_costs(levels, planes, flat, window, source_costs)
     normals = np.zeros((*gray.shape, 3), np.float32)
     sweeps.normals_of(planes, K, normals)
     return MatchResult(
         depth=np.reciprocal(planes[..., 0]), normals=normals, source_costs=source_costs
     )
+
+
+def _bands(gray: GrayImage, num_sources: int) -> list[tuple[int, int]]:
+    """Ranges of rows, of no more work than Ctrl-C and progress may wait for."""
+    height, width = gray.shape
+    rows = max(LEAST_ROWS, BAND_PIXELS // (width * num_sources))
+    return [(top, min(top + rows, height)) for top in range(0, height, rows)]
 
 
 def _flat_sources(

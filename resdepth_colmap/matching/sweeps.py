@@ -125,7 +125,7 @@ def _finest_step(x, y, w, sources):
 
 @njit(cache=True, parallel=True, fastmath=True)
 def sweep(levels, K, planes, costs, sources, window, w_range, smoothness, seed,
-          number, color, geometric):  # fmt: skip
+          number, color, geometric, rows):  # fmt: skip
     """Update the pixels of one colour of the checkerboard in place.
 
     Each pixel takes the best of its own plane, those of eight neighbouring regions,
@@ -145,11 +145,13 @@ def sweep(levels, K, planes, costs, sources, window, w_range, smoothness, seed,
         number: Number of the sweep, from 1.
         color: 0 or 1.
         geometric: Whether the sources' depth maps count.
+        rows: First row and the one after the last; the order of rows is free.
     """
-    height, width = levels.shape[1:]
+    width = levels.shape[2]
     num_sources = sources.A.shape[0]
-    for row in prange(height):
-        y = np.int64(row)  # an unsigned number and a signed one would make a float
+    for index in prange(rows[1] - rows[0]):
+        # An unsigned number and a signed one would make a float.
+        y = rows[0] + np.int64(index)
         weights = np.empty(window.dx.shape[0], np.float32)
         values = np.empty(window.dx.shape[0], np.float32)
         states = np.empty((NUM_STATES, 3), np.float32)

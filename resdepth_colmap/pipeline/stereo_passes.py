@@ -88,7 +88,7 @@ class ViewMatcher:
         Args:
             plan: The view.
             which: The pass.
-            advance: Is told of each sweep; `which.num_units` for all of them.
+            advance: Is told of each step; `which.num_units` for all of them.
 
         Returns:
             Why there is nothing to match, or "".
@@ -117,7 +117,7 @@ class ViewMatcher:
             self.config,
             start=start,
             source_depths=source_depths,
-            on_sweep=lambda _, total: advance(which.num_units / total),
+            on_step=lambda _, total: advance(which.num_units / total),
         )
         found: Surface = result
         agrees = None

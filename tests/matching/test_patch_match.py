@@ -9,6 +9,7 @@ from numba import get_num_threads, set_num_threads
 from numpy.typing import NDArray
 
 from resdepth_colmap.config import StereoConfig
+from resdepth_colmap.matching import patch_match
 from resdepth_colmap.matching.patch_match import (
     MatchResult,
     MatchView,
@@ -240,3 +241,28 @@ def test_shading_too_weak_for_a_window_is_matched_with_a_wider_one() -> None:
     error = np.abs(result.depth - truth) / truth
     assert np.var(views[0].gray[20:29, 30:39]) < 1e-5
     assert np.median(error[8:-8, 20:-20]) < 0.03
+
+
+def test_steps_are_counted_to_their_total_and_may_end_the_matching() -> None:
+    steps: list[tuple[int, int]] = []
+
+    def on_step(number: int, total: int) -> None:
+        steps.append((number, total))
+
+    match_view(_view(0.0), [_view(0.2)], NEAR_FAR, CONFIG, on_step=on_step)
+    total = steps[-1][1]
+    assert steps == [(number, total) for number in range(1, total + 1)]
+
+    def interrupted(number: int, total: int) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        match_view(_view(0.0), [_view(0.2)], NEAR_FAR, CONFIG, on_step=interrupted)
+
+
+def test_the_maps_do_not_depend_on_the_bands(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = _match(_view(0.25))
+    monkeypatch.setattr(patch_match, "BAND_PIXELS", 1)
+    monkeypatch.setattr(patch_match, "LEAST_ROWS", 7)
+    banded = _match(_view(0.25))
+    assert np.array_equal(whole.depth, banded.depth)
