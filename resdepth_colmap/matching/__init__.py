@@ -1,1 +1,7 @@
 """The CPU PatchMatch."""
+
+from pathlib import Path
+
+from resdepth_colmap.matching.kernel_cache import forget_stale_kernels
+
+forget_stale_kernels(Path(__file__).parent)
