@@ -46,9 +46,13 @@ fix: $(READY)  ## what a tool can mend
 	$(BIN)/ruff format .
 
 bench: $(READY)  ## measure what docs/benchmarks.md reports
+	$(BIN)/python scripts/bench_matching.py
+	$(BIN)/python scripts/bench_stereo_memory.py
 	$(BIN)/python scripts/bench_middlebury.py
 	$(BIN)/python scripts/bench_refine.py
 	$(BIN)/python scripts/bench_workspaces.py
+	$(BIN)/python scripts/bench_compare.py
+	$(BIN)/python scripts/bench_cloud.py
 	$(BIN)/python scripts/make_tables.py
 
 clean:
