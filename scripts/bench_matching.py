@@ -5,9 +5,9 @@
 Parts: meeting_room and plant against COLMAP's own maps, middlebury and rendered against
 the truth, speed on noise. Maps are made by the stage `stereo` with default options, in
 workspaces of their own in the cache; finished ones are not made again while the matcher
-is the same. One thread matches; processor seconds are told, which other jobs change
-little. Each part goes to docs/measurements/matching.json when it is done; then
-`python scripts/make_tables.py` puts the figures into the documents.
+finds the same (its METHOD). One thread matches; processor seconds are told, which other
+jobs change little. Each part goes to docs/measurements/matching.json when it is done;
+then `python scripts/make_tables.py` puts the figures into the documents.
 """
 
 import argparse
@@ -18,9 +18,9 @@ import os
 from pathlib import Path
 
 from resdepth_colmap.config import StereoConfig
-from resdepth_colmap.evaluation.matched_workspace import matcher_hash
 from resdepth_colmap.evaluation.matching_parts import PARTS, Folders, rounded
 from resdepth_colmap.evaluation.matching_tables import matching_table
+from resdepth_colmap.matching.patch_match import METHOD
 from resdepth_colmap.pipeline.versions import versions
 
 REPOSITORY = Path(__file__).resolve().parents[1]
@@ -44,12 +44,11 @@ def main() -> None:
     from resdepth_colmap.matching import sweeps  # noqa: F401 (the threading layer)
 
     numba.set_num_threads(1)
-    matcher = matcher_hash()
-    folders = Folders(data=arguments.data, cache=arguments.cache / matcher)
+    folders = Folders(data=arguments.data, cache=arguments.cache / f"method_{METHOD}")
     for name in arguments.only:
         measured = json.loads(output.read_text("utf-8")) if output.exists() else {}
         part = rounded(PARTS[name](folders))
-        measured[name] = {"date": today(), "matcher": matcher, **part}
+        measured[name] = {"date": today(), "method": METHOD, **part}
         measured |= {
             "command": "python scripts/bench_matching.py",
             "date": today(),

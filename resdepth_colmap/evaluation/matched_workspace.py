@@ -5,14 +5,12 @@ so that finished maps are not made again.
 """
 
 import dataclasses
-import hashlib
 import json
 import shutil
 import time
 from collections.abc import Mapping
 from pathlib import Path
 
-import resdepth_colmap.matching
 from resdepth_colmap.config import StereoBackend, StereoConfig
 from resdepth_colmap.io.files import write_whole
 from resdepth_colmap.io.model import read_scene
@@ -29,7 +27,6 @@ from resdepth_colmap.scene import Scene
 
 SHARED = ("images", "sparse", "ground_truth")
 COSTS_NAME = "cpu_seconds.json"
-_HASH_LENGTH = 8
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -122,12 +119,3 @@ def copied_maps(source: MatchedWorkspace, path: Path) -> MatchedWorkspace:
         shutil.copytree(source.workspace.stereo_path, partial)
         partial.rename(path / "stereo")
     return matched_workspace(source.path, path)
-
-
-def matcher_hash() -> str:
-    """A name for the matcher as it is: a hash of its source."""
-    digest = hashlib.sha256()
-    for folder in resdepth_colmap.matching.__path__:
-        for file in sorted(Path(folder).glob("*.py")):
-            digest.update(file.read_bytes())
-    return digest.hexdigest()[:_HASH_LENGTH]

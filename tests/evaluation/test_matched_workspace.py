@@ -14,7 +14,6 @@ from resdepth_colmap.evaluation.matched_workspace import (
     MatchedWorkspace,
     copied_maps,
     matched_workspace,
-    matcher_hash,
 )
 from resdepth_colmap.evaluation.matching_parts import (
     Folders,
@@ -122,8 +121,3 @@ def test_a_range_of_maps_is_stretched_by_a_quarter() -> None:
     found = stretched_range({"a": depths.astype(np.float32)[np.newaxis]})
     assert found["depth_min"] == pytest.approx(0.75 * 2.02)
     assert found["depth_max"] == pytest.approx(1.25 * 3.98)
-
-
-def test_a_matcher_has_one_name() -> None:
-    assert matcher_hash() == matcher_hash()
-    assert matcher_hash().isalnum()
