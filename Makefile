@@ -53,6 +53,7 @@ bench: $(READY)  ## measure what docs/benchmarks.md reports
 	$(BIN)/python scripts/bench_workspaces.py
 	$(BIN)/python scripts/bench_compare.py
 	$(BIN)/python scripts/bench_cloud.py
+	$(BIN)/python scripts/bench_commands.py
 	$(BIN)/python scripts/make_tables.py
 
 clean:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from resdepth_colmap.evaluation.cloud_tables import cloud_table
+from resdepth_colmap.evaluation.command_table import command_table
 from resdepth_colmap.evaluation.comparison_tables import comparison_table
 from resdepth_colmap.evaluation.markdown import HARDWARE as HARDWARE
 from resdepth_colmap.evaluation.markdown import (
@@ -146,6 +147,8 @@ DOCUMENTS: dict[str, dict[str, Renderer]] = {
         "workspaces": workspaces_table,
         "refine": refine_table,
         "variants": variants_table,
+        "middlebury_rough": middlebury_summary,
+        "commands": command_table,
         "cloud": cloud_table,
         "matching": matching_table,
         "compare": comparison_table,
