@@ -25,7 +25,9 @@ RESULT = REPOSITORY / "docs" / "measurements" / "commands.json"
 
 def command_lines(data: Path) -> list[tuple[str, list[str]]]:
     """What is run, in this order, and on what."""
-    cloud = "eth3d_cloud_cases/" + sorted(os.listdir(data / "eth3d_cloud_cases"))[0]
+    cloud = "eth3d_cloud_cases/" + min(
+        path.name for path in (data / "eth3d_cloud_cases").iterdir()
+    )
     scans = ["--ground-truth", f"{cloud}/scan_alignment.mlp"]
     return [
         ("7 scenes, matched", ["evaluate", "depth", "middlebury"]),
