@@ -30,8 +30,10 @@ class ViewMap:
     depth: DepthMap
 
 
-def confirmed(reference: ViewMap, others: Sequence[ViewMap], limit: float) -> Pixels:
-    """Where the map of any other view says the same as that of the reference.
+def num_confirming(
+    reference: ViewMap, others: Sequence[ViewMap], limit: float
+) -> npt.NDArray[np.int64]:
+    """How many maps of other views say the same as that of the reference.
 
     A pixel is lifted by its depth and seen in the other view; the depth of the nearest
     pixel there is compared with that of the point.
@@ -42,12 +44,17 @@ def confirmed(reference: ViewMap, others: Sequence[ViewMap], limit: float) -> Pi
         limit: Largest difference of the depths, relative to that of the point.
 
     Returns:
-        Shape (H, W); nowhere where the reference has no depth.
+        Shape (H, W); 0 where the reference has no depth.
     """
-    found = np.zeros(reference.depth.shape, np.bool_)
+    found = np.zeros(reference.depth.shape, np.int64)
     for other in others:
-        found |= _confirmed_by(reference, other, limit)
+        found += _confirmed_by(reference, other, limit)
     return found
+
+
+def confirmed(reference: ViewMap, others: Sequence[ViewMap], limit: float) -> Pixels:
+    """Where the map of any other view does: see `num_confirming`."""
+    return num_confirming(reference, others, limit) > 0
 
 
 def _confirmed_by(reference: ViewMap, other: ViewMap, limit: float) -> Pixels:

@@ -16,8 +16,8 @@ from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.evaluation.depth_metrics import depth_metrics
 from resdepth_colmap.evaluation.map_agreement import (
     ViewMap,
-    confirmed,
     mean_of,
+    num_confirming,
     shares_within,
 )
 from resdepth_colmap.evaluation.matched_workspace import (
@@ -113,12 +113,20 @@ def measure_meeting_room(folders: Folders) -> Result:
     maps: Result = {}
     for name, oracle in theirs.items():
         others = [other for other in theirs.values() if other is not oracle]
-        where = confirmed(oracle, others, CONFIRMED_WITHIN)
-        maps[name] = {"pixels": float(where.mean())}
+        counts = num_confirming(oracle, others, CONFIRMED_WITHIN)
+        maps[name] = {"pixels": float((counts > 0).mean())}
         for kind in KINDS:
             depth = depth_of(matched.workspace, name, kind)
-            maps[name][kind] = shares_within(depth, oracle.depth, where, LIMITS)
-    return compared(maps, seconds)
+            maps[name][kind] = shares_within(depth, oracle.depth, counts > 0, LIMITS)
+            maps[name][f"{kind}_twice"] = shares_within(
+                depth, oracle.depth, counts > 1, LIMITS
+            )
+    result = compared(maps, seconds)
+    result["mean_twice"] = {
+        kind: mean_of([entry[f"{kind}_twice"] for entry in maps.values()])
+        for kind in KINDS
+    }
+    return result
 
 
 def compared(maps: Result, seconds: Result) -> Result:

@@ -10,6 +10,7 @@ from resdepth_colmap.evaluation.map_agreement import (
     ViewMap,
     confirmed,
     mean_of,
+    num_confirming,
     shares_within,
 )
 from resdepth_colmap.geometry.pixels import index_K
@@ -69,6 +70,8 @@ def test_one_map_that_agrees_is_enough() -> None:
     wrong = with_depth(other, other.depth * 2)
     both = confirmed(reference, [wrong, other], 0.01)
     np.testing.assert_array_equal(both, confirmed(reference, [other], 0.01))
+    twice = num_confirming(reference, [other, wrong, other], 0.01)
+    np.testing.assert_array_equal(twice, 2 * both)
     assert both.any()
     assert not confirmed(reference, [], 0.01).any()
 
