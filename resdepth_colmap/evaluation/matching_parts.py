@@ -114,27 +114,47 @@ def measure_meeting_room(folders: Folders) -> Result:
     for name, oracle in theirs.items():
         others = [other for other in theirs.values() if other is not oracle]
         counts = num_confirming(oracle, others, CONFIRMED_WITHIN)
-        maps[name] = {"pixels": float((counts > 0).mean())}
-        for kind in KINDS:
+        maps[name] = {
+            "pixels": float((counts > 0).mean()),
+            "chance": _confirmed_by_chance(oracle, others),
+        }
+        # A view of whose sources none was matched has no geometric map.
+        for kind in matched.workspace.map_kinds(name):
             depth = depth_of(matched.workspace, name, kind)
             maps[name][kind] = shares_within(depth, oracle.depth, counts > 0, LIMITS)
             maps[name][f"{kind}_twice"] = shares_within(
                 depth, oracle.depth, counts > 1, LIMITS
             )
     result = compared(maps, seconds)
-    result["mean_twice"] = {
-        kind: mean_of([entry[f"{kind}_twice"] for entry in maps.values()])
-        for kind in KINDS
-    }
+    confirmed = sum(entry["pixels"] for entry in maps.values())
+    result["chance"] = sum(entry["chance"] for entry in maps.values()) / confirmed
+    result["mean_twice"] = {kind: _mean(maps, f"{kind}_twice") for kind in KINDS}
     return result
+
+
+def _confirmed_by_chance(oracle: ViewMap, others: list[ViewMap]) -> float:
+    """Share of the pixels that others confirm when all depths are wrong by 5 %."""
+    counts = [
+        num_confirming(
+            ViewMap(view=oracle.view, depth=oracle.depth * np.float32(factor)),
+            *(others, CONFIRMED_WITHIN),
+        )
+        for factor in (0.95, 1.05)
+    ]
+    return float((np.stack(counts) > 0).mean())
+
+
+def _mean(maps: Result, key: str) -> Result:
+    """Over the maps of which this was measured."""
+    return mean_of([entry[key] for entry in maps.values() if key in entry])
 
 
 def compared(maps: Result, seconds: Result) -> Result:
     """Of each map what was measured, and the means."""
     means = {
-        kind: mean_of([entry[kind] for entry in maps.values()])
+        kind: _mean(maps, kind)
         for kind in KINDS
-        if all(kind in entry for entry in maps.values())
+        if any(kind in entry for entry in maps.values())
     }
     return {"maps": maps, "mean": means, "cpu_s_per_map": seconds}
 

@@ -27,7 +27,8 @@ def test_each_source_shows_the_noise_of_the_plane_where_it_is_seen(
         xy, z = project(transform(source.cam_from_world, DEPTH * ray), source.K)
         x, y = np.rint(xy).astype(int)
         np.testing.assert_allclose(xy, [x, y], atol=1e-9)
-        assert (z, y) == (DEPTH, row)
+        assert float(z) == DEPTH
+        assert int(y) == row
         assert source.gray[y, x] == reference.gray[row, column]
         places.add(x)
     assert len(places) == num_sources
