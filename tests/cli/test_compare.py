@@ -18,6 +18,9 @@ from resdepth_colmap.io.workspace import open_workspace
 ALL_VIEWS = ("--min-num-views", "1")
 
 
+pytestmark = pytest.mark.slow  # each fuses, twice
+
+
 def compare(*arguments: object, exit_code: int = 0) -> Result:
     words = ["compare", *(str(word) for word in arguments)]
     result = CliRunner().invoke(main, words, prog_name="resdepth-colmap")

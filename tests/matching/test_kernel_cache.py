@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from resdepth_colmap.matching.kernel_cache import forget_stale_kernels
 
 INNER = "FACTOR = {}\n"
@@ -48,6 +50,7 @@ def called(folder: Path) -> str:
     return done.stdout.strip()
 
 
+@pytest.mark.slow
 def test_a_kernel_is_compiled_anew_when_a_constant_of_another_file_changed(
     tmp_path: Path,
 ) -> None:

@@ -47,6 +47,7 @@ def test_the_score_leaves_out_what_is_not_known() -> None:
     assert math.isnan(Scores(math.nan, math.nan, 1.0).score)
 
 
+@pytest.mark.slow
 def test_held_out_and_watched_scenes_are_measured_and_drawn(tmp_path: Path) -> None:
     scenes = [write_noisy_plane(tmp_path / "in" / name) for name in ("a", "b", "c")]
     watched = write_noisy_plane(tmp_path / "watched", wrong_share=0.6)
@@ -79,6 +80,7 @@ def test_held_out_and_watched_scenes_are_measured_and_drawn(tmp_path: Path) -> N
             assert picture.mode == "RGB"
 
 
+@pytest.mark.slow
 def test_what_a_training_starts_from_is_what_it_has_to_beat(tmp_path: Path) -> None:
     scenes = [write_noisy_plane(tmp_path / "in" / name) for name in ("a", "b")]
     weights = tmp_path / "first.safetensors"
