@@ -158,9 +158,10 @@ def main() -> None:
     from resdepth_colmap.pipeline.versions import versions
 
     output: Path = arguments.output
+    views = ["--views", *map(str, arguments.views)] if arguments.views else []
     measured = json.loads(output.read_text("utf-8")) if output.exists() else {}
     measured |= {
-        "command": "python scripts/bench_stereo_memory.py",
+        "command": " ".join(["python", "scripts/bench_stereo_memory.py", *views]),
         "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
         "versions": versions(),
         "options": {**CHEAP, "num_sources": NUM_SOURCES, "size_px": LARGE_PX},
