@@ -154,7 +154,6 @@ def main() -> None:
         path, options = arguments.child
         run_child(Path(path), json.loads(options), arguments.until_progress)
         return
-    from resdepth_colmap.evaluation.tables import stereo_memory_table
     from resdepth_colmap.pipeline.versions import versions
 
     output: Path = arguments.output
@@ -168,11 +167,21 @@ def main() -> None:
     }
     if not arguments.skip_start:
         measured["start"] = measure_start()
-    if arguments.views:
-        measured["memory"] = [measure_memory(number) for number in arguments.views]
+        keep(measured, output)
+    runs: list[dict[str, Any]] = []
+    for number in arguments.views:
+        runs.append(measure_memory(number))
+        keep({**measured, "memory": runs}, output)
+
+
+def keep(measured: dict[str, Any], output: Path) -> None:
+    """Write down what was measured so far, and print it."""
+    from resdepth_colmap.evaluation.tables import stereo_memory_table
+
     output.parent.mkdir(parents=True, exist_ok=True)
     output.write_text(json.dumps(measured, indent=2) + "\n", "utf-8")
-    print(stereo_memory_table(measured))
+    if "memory" in measured:
+        print(stereo_memory_table(measured), flush=True)
 
 
 if __name__ == "__main__":
