@@ -26,7 +26,7 @@ CFG_NAMES = ("patch-match.cfg", "fusion.cfg")
 
 # Measured on two cores with the default options; a guide, no promise.
 MEASURED_CORES = 2
-STEREO_S_PER_MEGAPIXEL_AND_PASS = 20.0
+STEREO_S_PER_MEGAPIXEL_AND_PASS = 16.0  # six sources
 REFINE_S_PER_MEGAPIXEL_AND_PASS = 1.5
 REFINE_BASE_MB = 700.0  # libraries, weights, one tile in the network
 REFINE_MB_PER_MEGAPIXEL = 150.0  # images, warped views and maps of one view
