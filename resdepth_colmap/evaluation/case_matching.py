@@ -75,7 +75,10 @@ def initial_depth(
         if cache:
             cache.add(name, views, case.depth_range, config, found)
     return InitialDepth(
-        depth=found.depth, origin=ORIGINS[backend], cpu_s=found.cpu_s or None
+        depth=found.depth,
+        origin=ORIGINS[backend],
+        cpu_s=found.cpu_s or None,
+        source_depths=found.source_depths,
     )
 
 
@@ -102,14 +105,15 @@ def _match_here(
 ) -> Matching:
     """Match the first view, in both passes unless `geom_consistency` is off.
 
-    The photometric maps of the sources, which the geometric pass needs, count for the
-    sources and not for this view, as in a workspace, where each is made once.
+    The photometric maps of the sources, which the geometric pass and the refinement
+    use, count for the sources and not for this view, as in a workspace, where each is
+    made once.
     """
     start = time.process_time()
     found = match_view(views[0], views[1:], depth_range, config)
     cpu_s = time.process_time() - start
+    source_depths = _source_depths(views, depth_range, config)
     if config.geom_consistency:
-        source_depths = _source_depths(views, depth_range, config)
         start = time.process_time()
         found = match_view(
             *(views[0], views[1:], depth_range, config),
@@ -117,7 +121,7 @@ def _match_here(
             source_depths=source_depths,
         )
         cpu_s += time.process_time() - start
-    return Matching(depth=found.depth, cpu_s=cpu_s)
+    return Matching(depth=found.depth, cpu_s=cpu_s, source_depths=tuple(source_depths))
 
 
 def _source_depths(

@@ -5,6 +5,7 @@ the plain baseline, and refined depth; residuals beyond a limit are discarded.
 """
 
 import dataclasses
+import itertools
 import time
 from collections.abc import Mapping
 
@@ -98,6 +99,7 @@ def measure_case(
 
 
 def _inputs(case: DepthCase, initial: InitialDepth) -> ViewInputs:
+    depths = initial.source_depths[: len(case.sources)]
     return ViewInputs(
         depth=initial.depth,
         gray=case.reference.gray,
@@ -107,8 +109,9 @@ def _inputs(case: DepthCase, initial: InitialDepth) -> ViewInputs:
                 gray=source.gray,
                 K=source.K,
                 source_from_reference=source_from_reference(case, source),
+                depth=depth,
             )
-            for source in case.sources
+            for source, depth in itertools.zip_longest(case.sources, depths)
         ),
     )
 

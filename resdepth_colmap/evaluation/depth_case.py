@@ -19,11 +19,14 @@ class InitialDepth:
         depth: Shape (H, W), in workspace units; 0 = no depth.
         origin: Who made it, for people.
         cpu_s: Processor seconds of all threads; None if it was there already.
+        source_depths: The sources' own maps, in their order, each of the size of its
+            view; None for one without, and for those beyond the end.
     """
 
     depth: DepthMap
     origin: str
     cpu_s: float | None = None
+    source_depths: tuple[DepthMap | None, ...] = ()
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)

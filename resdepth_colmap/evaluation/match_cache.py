@@ -10,6 +10,7 @@ import io
 import json
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -20,6 +21,8 @@ from resdepth_colmap.matching.patch_match import MatchView
 from resdepth_colmap.scene import DepthMap
 
 _HASH_LENGTH = 16
+_FORMAT = 2
+_SOURCE = "source_{}"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
@@ -29,10 +32,12 @@ class Matching:
     Attributes:
         depth: Shape (H, W), float32, in workspace units; all > 0.
         cpu_s: Processor seconds of all threads.
+        source_depths: What was found in the sources, in their order; maybe nothing.
     """
 
     depth: DepthMap
     cpu_s: float
+    source_depths: tuple[DepthMap, ...] = ()
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -57,7 +62,12 @@ class MatchCache:
         if not path.is_file():
             return None
         with np.load(path) as file:
-            return Matching(depth=file["depth"], cpu_s=float(file["cpu_s"]))
+            names = [_SOURCE.format(index) for index in range(len(views) - 1)]
+            return Matching(
+                depth=file["depth"],
+                cpu_s=float(file["cpu_s"]),
+                source_depths=tuple(file[name] for name in names if name in file),
+            )
 
     def add(
         self,
@@ -73,7 +83,11 @@ class MatchCache:
             WorkspaceError: If the file cannot be written.
         """
         data = io.BytesIO()
-        np.savez(data, depth=matching.depth, cpu_s=matching.cpu_s)
+        arrays: dict[str, Any] = {
+            _SOURCE.format(index): depth
+            for index, depth in enumerate(matching.source_depths)
+        }
+        np.savez(data, depth=matching.depth, cpu_s=matching.cpu_s, **arrays)
         write_whole(self._path(name, views, depth_range, config), data.getvalue())
 
     def _path(
@@ -83,7 +97,7 @@ class MatchCache:
         depth_range: tuple[float, float],
         config: StereoConfig,
     ) -> Path:
-        text = json.dumps([config.to_mapping(), depth_range], sort_keys=True)
+        text = json.dumps([_FORMAT, config.to_mapping(), depth_range], sort_keys=True)
         digest = hashlib.sha256(text.encode())
         for view in views:
             for array in (view.gray, view.K, view.cam_from_world):

@@ -1,5 +1,6 @@
 """Dense workspaces with `ground_truth/`: which of their views can be compared."""
 
+import dataclasses
 import functools
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from resdepth_colmap.evaluation.depth_case import (
 )
 from resdepth_colmap.geometry.depth_range import depth_range
 from resdepth_colmap.geometry.pixels import index_K
+from resdepth_colmap.geometry.resize import nearest_depth
 from resdepth_colmap.geometry.view_selection import choose_sources
 from resdepth_colmap.io.depth_map import read_depth_map
 from resdepth_colmap.io.images import read_gray
@@ -95,6 +97,9 @@ def _case(
             "neither matched nor refined; take its map out of ground_truth/."
         )
     sources = [choice.index for choice in choices]
+    if initial is not None:
+        maps = [_map_of(workspace, scene.views[other]) for other in sources]
+        initial = dataclasses.replace(initial, source_depths=tuple(maps))
     near, far = options.stereo.depth_min, options.stereo.depth_max
     return DepthCase(
         name=view.name,
@@ -133,6 +138,15 @@ def _initial(workspace: Workspace, view: View) -> InitialDepth | None:
     if not found.filled:
         raise WorkspaceError(f"{path}: no pixel has a depth; compute it again.")
     return InitialDepth(depth=found.depth, origin=f"{found.kind} maps in stereo/")
+
+
+def _map_of(workspace: Workspace, view: View) -> DepthMap | None:
+    """A source's own map at the size of its image; None if it has none."""
+    kinds = candidate_kinds(workspace, view.name)
+    if not kinds:
+        return None
+    found = choose_initial_map(workspace, view.name, view.camera, kinds)
+    return nearest_depth(found.depth, (view.camera.height_px, view.camera.width_px))
 
 
 def _check_shape(path: Path, shape: tuple[int, ...], view: View) -> None:

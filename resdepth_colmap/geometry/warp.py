@@ -39,7 +39,9 @@ def warp_to_reference(
         and within its image, shape (B, 1, H, W), bool.
     """
     height_px, width_px = source_image.shape[-2:]
-    homogeneous = _project(inverse_depth, reference_K, source_K, source_from_reference)
+    homogeneous = project_homogeneous(
+        inverse_depth, reference_K, source_K, source_from_reference
+    )
     in_front = homogeneous[:, 2] > LEAST_DEPTH_RATIO
     z = torch.where(in_front, homogeneous[:, 2], 1.0)
     xy = homogeneous[:, :2].movedim(1, -1) / z[..., None]
@@ -56,7 +58,7 @@ def warp_to_reference(
     return torch.where(inside[:, None], warped, 0.0), inside[:, None]
 
 
-def _project(
+def project_homogeneous(
     inverse_depth: Tensor,
     reference_K: Tensor,
     source_K: Tensor,

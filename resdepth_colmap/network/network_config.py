@@ -6,6 +6,9 @@ from typing import Self
 
 from resdepth_colmap.config import Config
 
+CARRIED_CHANGE, CARRIED = "carried_change", "carried"
+"""Channels of the source's depth map in the reference: where it differs, and is."""
+
 
 class InputVariant(enum.StrEnum):
     """What the network sees (paper, section "Network Variants")."""
@@ -35,6 +38,8 @@ class NetworkConfig(Config):
         num_sources: Warped second views (variants stereo and images-only).
         valid: Give it the mask of pixels whose depth was real, not filled.
         photo_consistency: Give it the local correlation of reference and warped view.
+        source_depth: Give it the depth map of the first source, carried into the
+            reference: where it differs, and where nothing arrives.
         gate: Let it weigh its residual by a learned gate in 0..1.
         last_block: One more convolution block at full resolution, before the last
             convolution: lets it weigh fine structure by what surrounds it.
@@ -49,6 +54,7 @@ class NetworkConfig(Config):
     num_sources: int = 1
     valid: bool = True
     photo_consistency: bool = True
+    source_depth: bool = True
     gate: bool = True
     last_block: bool = True
     confidence: bool = True
@@ -80,6 +86,7 @@ class NetworkConfig(Config):
             gate=False,
             last_block=False,
             photo_consistency=False,
+            source_depth=False,
             confidence=False,
             normalisation=Normalisation.BASELINE,
         )
@@ -106,6 +113,8 @@ class NetworkConfig(Config):
             names.append("valid")
         if self.photo_consistency and self.uses_sources:
             names.append("photo_consistency")
+        if self.source_depth and self.uses_sources and self.residual:
+            names += [CARRIED_CHANGE, CARRIED]
         return tuple(names)
 
     @property

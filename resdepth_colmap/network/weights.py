@@ -26,6 +26,9 @@ from resdepth_colmap.network.unet import ResDepthNet
 
 FORMAT = "resdepth-colmap"
 FORMAT_VERSION = 1
+_OLDER = {"source_depth": False}
+"""Options that the headers of older files do not name, as those networks were."""
+
 WAY_OUT = "use a file that `resdepth-colmap train` wrote, or leave out --weights"
 
 
@@ -126,7 +129,7 @@ def _stored(value: Tensor) -> Tensor:
 def _read(path: Path) -> tuple[NetworkConfig, dict[str, Tensor]]:
     header = _header(path)
     try:
-        config = NetworkConfig.from_mapping(header["network"])
+        config = NetworkConfig.from_mapping({**_OLDER, **header["network"]})
     except (ConfigError, TypeError) as error:
         raise WeightsError(f"{path}: unknown kind of network ({error})") from error
     try:

@@ -11,10 +11,17 @@ import torch
 from torch import Tensor
 from torch.nn.functional import avg_pool2d
 
+from resdepth_colmap.geometry.forward_warp import carry_inverse_depth
 from resdepth_colmap.geometry.holes import fill_holes
 from resdepth_colmap.geometry.inverse_depth import invert_map
 from resdepth_colmap.geometry.warp import warp_to_reference
-from resdepth_colmap.network.network_config import NetworkConfig, Normalisation
+from resdepth_colmap.network.network_config import (
+    CARRIED,
+    CARRIED_CHANGE,
+    NetworkConfig,
+    Normalisation,
+)
+from resdepth_colmap.network.unet import INPUT_LIMIT
 from resdepth_colmap.scene import DepthMap
 
 NCC_WINDOW_PX = 7
@@ -23,6 +30,7 @@ NO_EVIDENCE = 0.5  # photo-consistency of a correlation of 0
 LEAST_VALID_SHARE = 0.05  # below it, filled pixels count in the statistics too
 LEAST_RELATIVE_SPREAD = 0.02  # of the median: a fronto-parallel wall has no spread
 STATISTICS_SIDE_PX = 256  # quantiles of more pixels than that squared cost only time
+LARGEST_CHANGE = 4.0  # relative, of what the source's map says; more is an outlier
 DEFAULT_BASELINE_RATIO = 0.1  # baseline over depth where there is no second view
 
 
@@ -33,11 +41,14 @@ class SourceTensors(NamedTuple):
         gray: Grey values in 0..1, shape (B, 1, Hs, Ws).
         K: K for index coordinates, shape (B, 3, 3), in pixels.
         source_from_reference: Pose, shape (B, 3, 4), translation in units.
+        inverse_depth: Its own depth map at the size of the image, shape (B, 1, Hs, Ws),
+            in 1/unit; 0 = hole. None = there is no such map.
     """
 
     gray: Tensor
     K: Tensor
     source_from_reference: Tensor
+    inverse_depth: Tensor | None = None
 
 
 class ViewTensors(NamedTuple):
@@ -143,6 +154,7 @@ def build_inputs(view: ViewTensors, config: NetworkConfig) -> InputStack:
             is_there = index < len(warped)
             image = warped[index][0] if is_there else torch.zeros_like(view.gray)
             channels[f"source_{index}"] = image
+    channels |= _carried_channels(view)
     names = [name for name in config.channels if name != "inverse_depth"]
     if not config.uses_sources:
         view = view._replace(sources=())
@@ -163,6 +175,24 @@ def warp_sources(view: ViewTensors, num_sources: int) -> list[tuple[Tensor, Tens
         )
         for source in view.sources[:num_sources]
     ]
+
+
+def carried_inverse_depth(view: ViewTensors) -> Tensor:
+    """The first source's depth map in the reference camera.
+
+    Shape (B, 1, H, W), in 1/unit; 0 where none of its depths arrives, and everywhere
+    without such a map.
+    """
+    source = view.sources[0] if view.sources else None
+    if source is None or source.inverse_depth is None:
+        return torch.zeros_like(view.inverse_depth)
+    return carry_inverse_depth(
+        source.inverse_depth,
+        source.K,
+        view.K,
+        source.source_from_reference,
+        (view.inverse_depth.shape[-2], view.inverse_depth.shape[-1]),
+    )
 
 
 def photo_consistency(reference: Tensor, warped: list[tuple[Tensor, Tensor]]) -> Tensor:
@@ -229,7 +259,23 @@ def network_input(stack: InputStack, config: NetworkConfig) -> tuple[Tensor, Sca
     if not config.residual:
         return stack.guidance, scaling
     normalised = scaling.normalise(stack.inverse_depth)
-    return torch.cat([normalised, stack.guidance], dim=1), scaling
+    guidance = stack.guidance
+    if CARRIED_CHANGE in config.channels:
+        place = config.channels.index(CARRIED_CHANGE) - 1
+        change = guidance[:, place : place + 1] * stack.inverse_depth / scaling.scale
+        change = change.clamp(-INPUT_LIMIT, INPUT_LIMIT)
+        after = guidance[:, place + 1 :]
+        guidance = torch.cat([guidance[:, :place], change, after], dim=1)
+    return torch.cat([normalised, guidance], dim=1), scaling
+
+
+def _carried_channels(view: ViewTensors) -> dict[str, Tensor]:
+    """Relative difference of what the source's map says, and where it says anything."""
+    carried = carried_inverse_depth(view)
+    is_there = carried > 0
+    change = carried / view.inverse_depth - 1.0
+    change = torch.where(is_there, change, 0.0).clamp(max=LARGEST_CHANGE)
+    return {CARRIED_CHANGE: change, CARRIED: is_there.to(view.gray.dtype)}
 
 
 def _baseline(view: ViewTensors) -> Tensor:

@@ -17,6 +17,7 @@ from resdepth_colmap.pipeline.inputs import (
     SourceTensors,
     ViewTensors,
     build_inputs,
+    carried_inverse_depth,
     initial_tensors,
     network_input,
     photo_consistency,
@@ -39,6 +40,9 @@ LOG_SCALE_LIMIT = 12.0
 KEPT_CONSISTENCY = 0.15
 """Photo-consistency (NCC of 0.7) up to which the photographs confirm a depth."""
 
+KEPT_AGREEMENT = 0.01
+"""Relative difference up to which the source's own depth map confirms a depth."""
+
 FILTERED_SHARE = 0.95
 """A map with less of its pixels filled has been filtered."""
 
@@ -54,11 +58,21 @@ class SourceView:
         gray: Its image, of any size, shape (Hs, Ws), in 0..1.
         K: K for index coordinates of that size, shape (3, 3), in pixels.
         source_from_reference: Pose, shape (3, 4), translation in units.
+        depth: Its own depth map, shape (Hs, Ws), in units; 0 = hole. None = unknown.
     """
 
     gray: GrayImage
     K: Matrix
     source_from_reference: Matrix
+    depth: DepthMap | None = None
+
+    def __post_init__(self) -> None:
+        """Check that image and depth map have one size."""
+        if self.depth is not None and self.gray.shape != self.depth.shape:
+            raise ValueError(
+                f"{self.gray.shape=} but expected that of the depth map, "
+                f"{self.depth.shape}."
+            )
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
@@ -218,6 +232,7 @@ def view_tensors(view: ViewInputs, device: torch.device) -> ViewTensors:
                 _image(source.gray, device),
                 torch.from_numpy(source.K)[None],
                 torch.from_numpy(source.source_from_reference)[None],
+                None if source.depth is None else _inverse_depth(source.depth, device),
             )
             for source in view.sources
         ),
@@ -228,11 +243,16 @@ def _image(gray: GrayImage, device: torch.device) -> Tensor:
     return torch.from_numpy(np.array(gray, dtype=np.float32))[None, None].to(device)
 
 
+def _inverse_depth(depth: DepthMap, device: torch.device) -> Tensor:
+    return torch.from_numpy(invert_map(depth))[None, None].to(device)
+
+
 def _confirmed(tensors: ViewTensors, config: RefineConfig) -> Tensor:
     """Where the initial depth is real and its filter or a source vouches for it.
 
     Shape (B, 1, H, W), bool. A map with holes was filtered: what its filter left was
-    consistent over several views, which says more than one second view can.
+    consistent over several views, which says more than one second view can. A source
+    vouches by its photograph or by a depth map of its own that says the same.
     """
     if not config.keep_confirmed:
         return torch.zeros_like(tensors.valid)
@@ -242,6 +262,8 @@ def _confirmed(tensors: ViewTensors, config: RefineConfig) -> Tensor:
         return torch.zeros_like(tensors.valid)
     warped = warp_sources(tensors, 1)
     is_good = photo_consistency(tensors.gray, warped) < KEPT_CONSISTENCY
+    change = carried_inverse_depth(tensors) - tensors.inverse_depth
+    is_good |= change.abs() < KEPT_AGREEMENT * tensors.inverse_depth
     return is_good & tensors.valid
 
 

@@ -126,6 +126,7 @@ def _fingerprint(
         "views": [_facts_of(v) for v in views],
         "images": _stamps(workspace.image_path(v.name) for v in views),
         "maps": [kinds, _stamps(map_path(workspace, view.name, k) for k in kinds)],
+        "source_maps": [_map_stamps(workspace, v.name) for v in views[1:]],
     }
     text = json.dumps(facts, sort_keys=True, default=str)
     return hashlib.sha256(text.encode()).hexdigest()
@@ -134,6 +135,11 @@ def _fingerprint(
 def _facts_of(view: View) -> list[Any]:
     camera = dataclasses.asdict(view.camera)
     return [view.name, camera, view.cam_from_world.tolist()]
+
+
+def _map_stamps(workspace: Workspace, name: str) -> list[tuple[int, int]]:
+    kinds = workspace.original_kinds(name)
+    return _stamps(map_path(workspace, name, kind) for kind in kinds)
 
 
 def _stamps(paths: Iterable[Path]) -> list[tuple[int, int]]:

@@ -20,6 +20,7 @@ from resdepth_colmap.network.unet import ResDepthNet
 from resdepth_colmap.network.weights import load_weights, weights_hash
 from resdepth_colmap.pipeline.initial_map import (
     InitialMap,
+    candidate_kinds,
     check_maps_exist,
     choose_initial_map,
 )
@@ -28,7 +29,7 @@ from resdepth_colmap.pipeline.refine import RefinedView, refine_view
 from resdepth_colmap.pipeline.refine_plan import Skipped, ViewPlan, plan_views
 from resdepth_colmap.pipeline.view_images import ViewImages
 from resdepth_colmap.pipeline.view_inputs import view_inputs
-from resdepth_colmap.scene import Scene
+from resdepth_colmap.scene import DepthMap, Scene
 
 logger = logging.getLogger(__name__)
 
@@ -192,7 +193,12 @@ class _Loop:
             return f"its {initial.kind} depth map has no depth at all"
         sources = [choice.index for choice in plan.sources]
         inputs = view_inputs(
-            self.scene, plan.index, sources, initial.depth, self.view_images
+            self.scene,
+            plan.index,
+            sources,
+            initial.depth,
+            self.view_images,
+            self._source_depth if self.network.config.source_depth else None,
         )
         result = refine_view(inputs, self.network, self.config)
         self.output.write_maps(
@@ -203,6 +209,14 @@ class _Loop:
         self.images[view.name]["seconds"] = round(seconds, 3)
         self._save()
         return ""
+
+    def _source_depth(self, index: int) -> DepthMap | None:
+        """The map that a view starts from itself; None if it has none."""
+        view = self.scene.views[index]
+        kinds = candidate_kinds(self.workspace, view.name, self.config.input)
+        if not kinds:
+            return None
+        return choose_initial_map(self.workspace, view.name, view.camera, kinds).depth
 
     def _save(self) -> None:
         self.record = {**self.record, RECORD_KEY: self.images}

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import torch
+from torch import Tensor
 
 from resdepth_colmap.errors import ConfigError
 from resdepth_colmap.network.network_config import InputVariant, NetworkConfig
@@ -14,6 +15,9 @@ from resdepth_colmap.training.train_config import Preset, TrainConfig
 
 SHIPPED = Path("shipped")
 """As the file to start from: the weights that come with the package."""
+
+_FIRST_KERNEL = "encoder.0.0.weight"
+_INPUTS = ("valid", "photo_consistency", "source_depth")
 
 
 def chosen_network(
@@ -41,8 +45,8 @@ def chosen_network(
     path = _path(config.init)
     theirs = load_weights(path).config
     ours = NetworkConfig.from_mapping({**theirs.to_mapping(), **options})
-    _check_same(path, theirs, ours)
-    return theirs
+    _check_fits(path, theirs, ours)
+    return ours
 
 
 def fresh_network(network_config: NetworkConfig, config: TrainConfig) -> ResDepthNet:
@@ -57,15 +61,20 @@ def fresh_network(network_config: NetworkConfig, config: TrainConfig) -> ResDept
 
     Raises:
         WeightsError: If the weights to start from cannot be read.
-        ConfigError: If they are of another network.
+        ConfigError: If they are of another network. One that sees less will do: it
+            begins as blind to the new inputs as it was.
     """
     torch.manual_seed(config.seed)
     network = ResDepthNet(network_config)
     if config.init is not None:
         path = _path(config.init)
         loaded = load_weights(path)
-        _check_same(path, loaded.config, network_config)
-        network.load_state_dict(loaded.state_dict())
+        _check_fits(path, loaded.config, network_config)
+        weights = loaded.state_dict()
+        weights[_FIRST_KERNEL] = _widened(
+            weights[_FIRST_KERNEL], loaded.config, network_config
+        )
+        network.load_state_dict(weights)
     return network
 
 
@@ -73,12 +82,21 @@ def _path(init: Path) -> Path:
     return default_weights_path() if init == SHIPPED else init
 
 
-def _check_same(path: Path, theirs: NetworkConfig, ours: NetworkConfig) -> None:
+def _widened(kernel: Tensor, theirs: NetworkConfig, ours: NetworkConfig) -> Tensor:
+    """The first convolution's kernel, with zeros for inputs that it did not see."""
+    wide = kernel.new_zeros(kernel.shape[0], len(ours.channels), *kernel.shape[2:])
+    for place, name in enumerate(theirs.channels):
+        wide[:, ours.channels.index(name)] = kernel[:, place]
+    return wide
+
+
+def _check_fits(path: Path, theirs: NetworkConfig, ours: NetworkConfig) -> None:
     other, wanted = theirs.to_mapping(), ours.to_mapping()
     differences = [
         f"{name} {other[name]}, not {wanted[name]}"
         for name in wanted
         if other[name] != wanted[name]
+        and not (name in _INPUTS and wanted[name])  # an input more
     ]
     if differences:
         raise ConfigError(

@@ -13,7 +13,11 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from resdepth_colmap.errors import TrainingError
-from resdepth_colmap.network.network_config import NetworkConfig
+from resdepth_colmap.network.network_config import (
+    CARRIED,
+    CARRIED_CHANGE,
+    NetworkConfig,
+)
 from resdepth_colmap.pipeline.inputs import InputStack, network_input
 from resdepth_colmap.training.samples import (
     HOLES,
@@ -25,6 +29,10 @@ from resdepth_colmap.training.samples import (
 
 NEAR_TRUTH_WEIGHT = (0.3, 3.0)
 """Range of the weight that turns errors of inverse depth into relative ones."""
+
+
+NO_SOURCE_DEPTH_SHARE = 0.15
+"""Share of crops that are not shown the source's depth map: users may have none."""
 
 
 class Batch(NamedTuple):
@@ -162,6 +170,8 @@ class CropSampler:
             return np.ascontiguousarray(cropped)
 
         guidance = cut(sample.guidance[self._channels]).astype(np.float32)
+        if rng.random() < NO_SOURCE_DEPTH_SHARE:
+            guidance = self._without_source_depth(guidance)
         if self.vary_light:
             guidance = self._other_light(guidance, rng)
         return Sample(
@@ -203,6 +213,14 @@ class CropSampler:
                 gray = np.clip(guidance[index], 0.0, 1.0) ** own
                 gray = gray * gain * np.exp(rng.normal(0.0, 0.05))
                 guidance[index] = np.clip(gray, 0.0, 1.0)
+        return guidance
+
+    def _without_source_depth(
+        self, guidance: NDArray[np.float32]
+    ) -> NDArray[np.float32]:
+        for name in (CARRIED_CHANGE, CARRIED):
+            if name in self.config.channels:
+                guidance[self.config.channels.index(name) - 1] = 0.0
         return guidance
 
 

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from resdepth_colmap.config import StereoConfig
+from resdepth_colmap.geometry.resize import nearest_depth
 from resdepth_colmap.geometry.view_selection import choose_sources
 from resdepth_colmap.io.depth_map import read_depth_map
 from resdepth_colmap.io.model import read_scene
@@ -101,8 +102,16 @@ class LabelledView:
         choices = choose_sources(self.scene, self.index, num_sources)
         images = ViewImages(self.workspace, 1 + num_sources)
         sources = [choice.index for choice in choices]
-        inputs = view_inputs(self.scene, self.index, sources, depth, images)
+        maps = {index: self._map_of(index) for index in sources}
+        inputs = view_inputs(self.scene, self.index, sources, depth, images, maps.get)
         return Loaded(inputs, truth)
+
+    def _map_of(self, index: int) -> DepthMap | None:
+        """The map of the same kind of another view."""
+        name = self.scene.views[index].name
+        if self.kind not in candidate_kinds(self.workspace, name):
+            return None
+        return read_depth_map(map_path(self.workspace, name, self.kind))
 
 
 def labelled_views(
@@ -138,17 +147,6 @@ def labelled_views(
         )
         views = _with_maps(workspace, scene, with_truth)
     return views
-
-
-def nearest_depth(depth: DepthMap, shape: tuple[int, ...]) -> DepthMap:
-    """A depth map at another size (height, width): never a mean of two depths."""
-    if depth.shape == shape:
-        return depth
-    rows, columns = (
-        ((np.arange(new) + 0.5) * old / new).astype(np.intp)
-        for new, old in zip(shape, depth.shape, strict=True)
-    )
-    return depth[np.ix_(rows, columns)]
 
 
 def _with_maps(

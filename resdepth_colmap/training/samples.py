@@ -18,7 +18,11 @@ import torch
 from numpy.typing import NDArray
 
 from resdepth_colmap.io.files import write_whole
-from resdepth_colmap.network.network_config import NetworkConfig
+from resdepth_colmap.network.network_config import (
+    CARRIED,
+    CARRIED_CHANGE,
+    NetworkConfig,
+)
 from resdepth_colmap.pipeline.inputs import build_inputs
 from resdepth_colmap.pipeline.progress import Progress, SilentProgress
 from resdepth_colmap.pipeline.refine import ViewInputs, view_tensors
@@ -34,7 +38,7 @@ FILTERED_SHARE = 0.95
 DENSE, HOLES = "-dense", "-holes"
 """How the names of samples end: of a map without and with holes."""
 
-_FORMAT = 2
+_FORMAT = 3
 
 
 class Sample(NamedTuple):
@@ -144,7 +148,8 @@ def _prepare_view(view: LabelledView, num_sources: int, folder: Path) -> list[Pa
     depth = _with_holes(loaded.inputs.depth, sample, num_sources)
     if depth is None:
         return [dense]
-    _write_sample(holes, build_sample(_with_depth(loaded, depth), num_sources))
+    sample = build_sample(_with_depth(loaded, depth), num_sources)
+    _write_sample(holes, _without_carried(sample, depth, num_sources))
     return [dense, holes]
 
 
@@ -155,6 +160,15 @@ def _fingerprint(view: LabelledView) -> str:
     states = [(path.stat().st_size, path.stat().st_mtime_ns) for path in paths]
     key = json.dumps([_FORMAT, str(view.workspace.path.resolve()), states])
     return hashlib.sha256(key.encode()).hexdigest()[:10]
+
+
+def _without_carried(sample: Sample, depth: DepthMap, num_sources: int) -> Sample:
+    """The sample with the same holes in the source's map: a filter has no favourite."""
+    names = guidance_names(num_sources)
+    guidance = sample.guidance.copy()
+    for name in (CARRIED_CHANGE, CARRIED):
+        guidance[names.index(name)][depth == 0] = 0
+    return sample._replace(guidance=guidance)
 
 
 def _with_depth(loaded: Loaded, depth: DepthMap) -> Loaded:

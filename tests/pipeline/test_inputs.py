@@ -144,8 +144,8 @@ def test_a_batch_is_normalised_view_by_view() -> None:
     singles = [network_input(build_inputs(view, config), config)[0] for view in views]
     source = SourceTensors(
         *(
-            torch.cat([view.sources[0][i] for view in views])
-            for i in range(len(SourceTensors._fields))
+            torch.cat([getattr(view.sources[0], name) for view in views])
+            for name in ("gray", "K", "source_from_reference")
         )
     )
     both = ViewTensors(

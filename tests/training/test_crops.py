@@ -85,7 +85,7 @@ def test_images_of_different_sizes_share_a_batch(tmp_path: Path) -> None:
         scene = write_noisy_plane(tmp_path / name, size_px=size_px)
         paths += prepare_samples([scene], NETWORK, tmp_path / "cache")
     sampler = sampler_of(tuple(paths), batch_size=8, crop_px=512)
-    assert sampler.batch(0).inputs.shape == (8, 5, 56, 56)
+    assert sampler.batch(0).inputs.shape == (8, 7, 56, 56)
 
 
 def test_too_small_an_image_is_named(samples: tuple[Path, ...]) -> None:

@@ -10,10 +10,11 @@ from planes import NAMES
 
 from resdepth_colmap.config import StereoConfig
 from resdepth_colmap.errors import WorkspaceError
+from resdepth_colmap.geometry.resize import nearest_depth
 from resdepth_colmap.io.depth_map import read_depth_map, write_depth_map
 from resdepth_colmap.network.network_config import InputVariant, NetworkConfig
 from resdepth_colmap.training import labelled_views as labelled_views_module
-from resdepth_colmap.training.labelled_views import labelled_views, nearest_depth
+from resdepth_colmap.training.labelled_views import labelled_views
 from resdepth_colmap.training.samples import (
     DENSE,
     HOLES,
@@ -77,7 +78,14 @@ def test_all_variants_share_their_samples(tmp_path: Path) -> None:
     }
     assert all(found == paths[InputVariant.STEREO] for found in paths.values())
     channels = guidance_names(1)
-    assert channels == ("reference", "source_0", "valid", "photo_consistency")
+    assert channels == (
+        "reference",
+        "source_0",
+        "valid",
+        "photo_consistency",
+        "carried_change",
+        "carried",
+    )
     assert len(read_sample(paths[InputVariant.MONO][0]).guidance) == len(channels)
 
 

@@ -1,0 +1,68 @@
+"""A second view's depth map, carried into the reference camera.
+
+What the source measured, seen from the reference: where nothing arrives, the source
+does not see that surface (or found no depth there), so that no photograph of it can
+tell the reference's depth.
+"""
+
+import itertools
+
+import torch
+from torch import Tensor
+
+from resdepth_colmap.geometry.warp import LEAST_DEPTH_RATIO, project_homogeneous
+
+REACH_PX = 0.25
+"""How far a point reaches beyond the pixel that it falls into."""
+
+
+def carry_inverse_depth(
+    source_inverse_depth: Tensor,
+    source_K: Tensor,
+    reference_K: Tensor,
+    source_from_reference: Tensor,
+    size_px: tuple[int, int],
+) -> Tensor:
+    """Move each depth of the source to where the reference sees that point.
+
+    Each point covers a little more than a pixel, so that a surface stays closed where
+    the reference sees it up to 1.5 times larger; of several the nearest counts. Nothing
+    is interpolated: no depth lies between two surfaces.
+
+    Args:
+        source_inverse_depth: Shape (B, 1, Hs, Ws), in 1/unit; 0 = no depth.
+        source_K: K for index coordinates, shape (B, 3, 3), in pixels.
+        reference_K: The same of the reference, shape (B, 3, 3).
+        source_from_reference: Pose, shape (B, 3, 4), translation in units.
+        size_px: Height and width of the reference.
+
+    Returns:
+        Inverse depth in the reference, shape (B, 1, H, W), in 1/unit; 0 where no depth
+        of the source arrives.
+    """
+    height_px, width_px = size_px
+    batch = source_inverse_depth.shape[0]
+    homogeneous = project_homogeneous(
+        source_inverse_depth, source_K, reference_K, _inverse(source_from_reference)
+    )
+    depth_ratio = homogeneous[:, 2]
+    usable = (source_inverse_depth[:, 0] > 0) & (depth_ratio > LEAST_DEPTH_RATIO)
+    ratio = torch.where(usable, depth_ratio, 1.0)
+    inverse_depth = source_inverse_depth[:, 0] / ratio
+    x, y = (homogeneous[:, axis] / ratio for axis in (0, 1))
+    first = torch.arange(batch, device=x.device)[:, None, None] * height_px * width_px
+    carried = source_inverse_depth.new_zeros(batch * height_px * width_px)
+    for shift_x, shift_y in itertools.product((-REACH_PX, REACH_PX), repeat=2):
+        column, row = torch.round(x + shift_x), torch.round(y + shift_y)
+        inside = usable & (column >= 0) & (column < width_px)
+        inside &= (row >= 0) & (row < height_px)
+        pixels = row[inside].long() * width_px + column[inside].long()
+        pixels += first.expand_as(row)[inside]
+        carried.scatter_reduce_(0, pixels, inverse_depth[inside], reduce="amax")
+    return carried.reshape(batch, 1, height_px, width_px)
+
+
+def _inverse(pose: Tensor) -> Tensor:
+    """The pose the other way round, shape (B, 3, 4)."""
+    rotation = pose[..., :3].transpose(-1, -2)
+    return torch.cat([rotation, -rotation @ pose[..., 3:]], dim=-1)
