@@ -4,16 +4,21 @@ import dataclasses
 import math
 
 import torch
-from torch import nn
+from torch import Tensor, nn
 from torch.nn.parallel import DistributedDataParallel
 
 from resdepth_colmap.errors import TrainingError
-from resdepth_colmap.network.unet import ResDepthNet
+from resdepth_colmap.network.unet import Refinement, ResDepthNet
 from resdepth_colmap.training.crops import Batch
 from resdepth_colmap.training.loss import refinement_loss
 from resdepth_colmap.training.ranks import Ranks
 from resdepth_colmap.training.synced_norm import sync_norms
-from resdepth_colmap.training.train_config import Optimiser, Schedule, TrainConfig
+from resdepth_colmap.training.train_config import (
+    Optimiser,
+    Precision,
+    Schedule,
+    TrainConfig,
+)
 
 WARM_UP_SHARE = 0.05
 
@@ -88,7 +93,7 @@ class Optimisation:
         self.model.train()
         batch = batch.to(self.ranks.device)
         inputs = batch.inputs.contiguous(memory_format=torch.channels_last)
-        loss = refinement_loss(self.model(inputs), batch, self.config)
+        loss = refinement_loss(self._refined(inputs), batch, self.config)
         total, num_known, num_stops = self.ranks.summed(
             [float(loss.total.detach()), float(loss.num_known), float(wants_stop)]
         )
@@ -104,6 +109,15 @@ class Optimisation:
         self.optimiser.step()
         self.schedule.step()
         return value, num_stops > 0
+
+    def _refined(self, inputs: Tensor) -> Refinement:
+        """The network's output in single precision, whatever it computed with."""
+        halved = self.config.precision is Precision.BFLOAT16
+        with torch.autocast(inputs.device.type, torch.bfloat16, enabled=halved):
+            inverse_depth, log_scale = self.model(inputs)
+        return Refinement(
+            inverse_depth.float(), None if log_scale is None else log_scale.float()
+        )
 
     def _check_finite(self, what: str, value: float, batch: Batch) -> None:
         if not math.isfinite(value):

@@ -21,12 +21,16 @@ def view(seed: int) -> MatchView:
 def test_what_is_added_is_found_for_the_same_input_only(tmp_path: Path) -> None:
     cache = MatchCache(folder=tmp_path / "new")
     views = [view(0), view(1)]
-    matching = Matching(depth=np.full((4, 5), 1.5, np.float32), cpu_s=2.5)
+    sources = (np.full((4, 5), 2.5, np.float32),)
+    matching = Matching(
+        depth=np.full((4, 5), 1.5, np.float32), cpu_s=2.5, source_depths=sources
+    )
     assert cache.find("a", views, RANGE, CONFIG) is None
     cache.add("a", views, RANGE, CONFIG, matching)
     found = cache.find("a", views, RANGE, CONFIG)
     assert found is not None and found.cpu_s == 2.5
     assert np.array_equal(found.depth, matching.depth)
+    assert np.array_equal(found.source_depths, sources)
     moved = dataclasses.replace(views[1], cam_from_world=np.ones((3, 4)))
     assert cache.find("b", views, RANGE, CONFIG) is None
     assert cache.find("a", [view(0), view(2)], RANGE, CONFIG) is None

@@ -1,9 +1,11 @@
+import dataclasses
 import json
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 import torch
+from safetensors import safe_open
 from safetensors.torch import load_file, save_file
 from torch import Tensor
 
@@ -183,3 +185,14 @@ def test_without_a_file_the_packages_own_weights_are_meant(
 def test_the_packages_own_weights_lie_in_the_package() -> None:
     path = weights.default_weights_path()
     assert path.parts[-3:] == ("resdepth_colmap", "weights", "resdepth.safetensors")
+
+
+def test_a_file_from_before_an_option_is_of_a_network_without_it(file: Path) -> None:
+    before = ResDepthNet(dataclasses.replace(CONFIG, source_depth=False))
+    save_weights(file, before)
+    with safe_open(file, framework="pt") as opened:
+        header = json.loads(opened.metadata()[weights.FORMAT])
+    del header["network"]["source_depth"]
+    metadata = {weights.FORMAT: json.dumps(header)}
+    save_file(load_file(file), file, metadata)
+    assert load_weights(file).config == before.config

@@ -3,10 +3,21 @@ import dataclasses
 import numpy as np
 import pytest
 import torch
-from analytic_scene import Pair, plane_pair, sphere_pair
+from analytic_scene import (
+    PLANE_NORMAL,
+    PLANE_OFFSET,
+    Pair,
+    depth_of_plane,
+    plane_pair,
+    sphere_pair,
+    tensor,
+    two_views,
+)
 
 from resdepth_colmap.geometry.inverse_depth import inverse_depth
 from resdepth_colmap.network.network_config import (
+    CARRIED,
+    CARRIED_CHANGE,
     InputVariant,
     NetworkConfig,
     Normalisation,
@@ -227,3 +238,27 @@ def test_a_network_that_sees_no_sources_is_the_same_with_and_without_them(
     without = build_inputs(view._replace(sources=()), config)
     assert torch.equal(with_sources.baseline, without.baseline)
     assert torch.equal(with_sources.guidance, without.guidance)
+
+
+def test_the_sources_map_is_shown_as_a_difference_in_the_tiles_own_scale() -> None:
+    pair = plane_pair()
+    view = view_of(pair)
+    source_view = two_views()[1]
+    in_source = tensor(depth_of_plane(source_view, PLANE_NORMAL, PLANE_OFFSET))[None]
+    source = view.sources[0]._replace(inverse_depth=inverse_depth(in_source))
+    config = NetworkConfig()
+    change, carried = (config.channels.index(n) for n in (CARRIED_CHANGE, CARRIED))
+    blind, _ = network_input(build_inputs(view, config), config)
+    assert not blind[:, [change, carried]].any()
+    for factor in (1.0, 1.25):
+        moved = view._replace(
+            inverse_depth=view.inverse_depth * factor, sources=(source,)
+        )
+        stack, scaling = network_input(build_inputs(moved, config), config)
+        arrived = stack[:, carried] > 0
+        assert float(arrived.double().mean()) > 0.6
+        assert not stack[:, change][~arrived].any()
+        # What the source says is the input depth plus the difference.
+        said = scaling.restore(stack[:, :1] + stack[:, [change]])
+        error = (said * pair.depth - 1).abs()[arrived[:, None]]
+        assert float(error.max()) < 0.02

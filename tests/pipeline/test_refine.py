@@ -256,3 +256,34 @@ def test_what_a_filter_left_stays_where_it_is_changed_a_little() -> None:
     assert little.any()
     np.testing.assert_allclose(with_rule[little], initial.depth[little], rtol=1e-6)
     np.testing.assert_array_equal(with_rule[~measured], without[~measured])
+
+
+def test_what_the_sources_own_map_confirms_stays() -> None:
+    initial = view()
+    reference, source = two_views()
+    exact, in_source = (
+        depth_of_plane(it, PLANE_NORMAL, PLANE_OFFSET) for it in (reference, source)
+    )
+    grey = np.full_like(initial.gray, 0.5)  # no photograph confirms anything
+    unlike = np.full_like(initial.sources[0].gray, 0.5)
+    kept = {}
+    for factor in (1.0, 1.05):
+        second = dataclasses.replace(
+            initial.sources[0],
+            gray=unlike,
+            depth=(factor * in_source).astype(np.float32),
+        )
+        initial = dataclasses.replace(
+            initial, depth=exact.astype(np.float32), gray=grey, sources=(second,)
+        )
+        with_rule, without = with_and_without_rule(initial)
+        little = np.abs(1 / without - 1 / exact) < 0.0499 / exact
+        seen = little & ~np.isclose(without, exact, rtol=1e-4)
+        kept[factor] = np.isclose(with_rule, exact, rtol=1e-6)[seen].mean()
+    assert kept[1.0] > 0.6
+    assert kept[1.05] < 0.05
+
+
+def test_a_sources_map_of_another_size_than_its_image_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"\(10, 10\)"):
+        dataclasses.replace(view().sources[0], depth=np.ones((10, 10), np.float32))

@@ -162,25 +162,37 @@ def test_a_second_run_does_nothing(tmp_path: Path) -> None:
     assert map_path(folder / "resdepth", NAMES[0]).stat().st_mtime_ns == time_before
 
 
-def test_what_changed_is_done_again_and_nothing_else(tmp_path: Path) -> None:
+def users_of(name: str, report: RefineReport) -> set[str]:
+    """The image itself and those that it is the second view of."""
+    return {name} | {
+        user
+        for user, record in report.images.items()
+        if record["sources"][0]["name"] == name
+    }
+
+
+def test_a_changed_map_is_refined_again_and_those_that_look_at_it(
+    tmp_path: Path,
+) -> None:
+    folder = plane_folder(tmp_path)
+    users = users_of(NAMES[3], refine(folder))
+    with_holes(map_path(folder, NAMES[3]), 5)
+    assert set(refine(folder).refined) == users
+    assert len(users) < len(NAMES)
+
+
+def test_a_lost_result_is_made_again_and_nothing_else(tmp_path: Path) -> None:
     folder = plane_folder(tmp_path)
     refine(folder)
-    with_holes(map_path(folder, NAMES[0]), 5)
-    assert refine(folder).refined == (NAMES[0],)
     map_path(folder / "resdepth", NAMES[2]).unlink()
     assert refine(folder).refined == (NAMES[2],)
 
 
 def test_a_changed_source_image_means_again(tmp_path: Path) -> None:
     folder = plane_folder(tmp_path)
-    images = refine(folder).images
+    users = users_of(NAMES[0], refine(folder))
     status = (folder / "images" / NAMES[0]).stat()
     os.utime(folder / "images" / NAMES[0], (status.st_atime, status.st_mtime + 5))
-    users = {
-        name
-        for name, record in images.items()
-        if name == NAMES[0] or record["sources"][0]["name"] == NAMES[0]
-    }
     assert set(refine(folder).refined) == users
 
 

@@ -60,3 +60,30 @@ def test_the_same_seed_gives_the_same_random_weights() -> None:
     )
     assert torch.equal(first, again)
     assert not torch.equal(first, other)
+
+
+def test_new_inputs_change_nothing_at_first(tmp_path: Path) -> None:
+    torch.manual_seed(3)
+    blind = dataclasses.replace(NETWORK, source_depth=False, valid=False)
+    old = ResDepthNet(blind)
+    torch.nn.init.normal_(old.head.weight)
+    path = tmp_path / "blind.safetensors"
+    save_weights(path, old)
+    config = TrainConfig(init=path)
+    chosen = chosen_network(config, {"source_depth": True, "valid": True})
+    assert chosen == NETWORK
+    wide = fresh_network(chosen, config).eval()
+    stack = torch.randn(1, len(chosen.channels), 16, 16)
+    places = [chosen.channels.index(name) for name in blind.channels]
+    expected = load_weights(path)(stack[:, places])
+    torch.testing.assert_close(wide(stack), expected)
+    wide.train()(stack).inverse_depth.sum().backward()
+    gradient = wide.encoder[0][0].weight.grad  # type: ignore[index]
+    assert isinstance(gradient, torch.Tensor)
+    assert all(gradient[:, place].any() for place in range(len(chosen.channels)))
+
+
+def test_an_input_that_the_weights_know_is_not_taken_away(weights: Path) -> None:
+    config = TrainConfig(init=weights)
+    with pytest.raises(ConfigError, match="source_depth True, not False"):
+        chosen_network(config, {"source_depth": False})

@@ -1,5 +1,6 @@
 """Laws of the training: the same steps whatever the stops; what a bad batch does."""
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ from resdepth_colmap.network.weights import load_weights
 from resdepth_colmap.training.crops import CropSampler
 from resdepth_colmap.training.loop import train
 from resdepth_colmap.training.samples import prepare_samples
-from resdepth_colmap.training.train_config import TrainConfig
+from resdepth_colmap.training.train_config import Precision, TrainConfig
 
 NETWORK = NetworkConfig(levels=3, base_channels=4, max_channels=8)
 TRAINING = TrainConfig(
@@ -140,3 +141,18 @@ def test_the_copy_with_holes_is_told_so(workspace: Path, tmp_path: Path) -> None
     assert shares["holes"] < 1.0
     name = sorted((workspace / "ground_truth").rglob("*.bin"))[0]
     assert read_depth_map(name).min() > 0
+
+
+def test_half_the_precision_trains_nearly_the_same(
+    workspace: Path, tmp_path: Path
+) -> None:
+    found = {}
+    for precision in Precision:
+        config = dataclasses.replace(TRAINING, precision=precision)
+        path = train([workspace], tmp_path / precision, NETWORK, config)
+        found[precision] = _parameters(path)
+        log = (tmp_path / precision / "log.csv").read_text().splitlines()
+        found[precision]["loss"] = torch.tensor(float(log[-1].split(",")[2]))
+    single, halved = found[Precision.SINGLE], found[Precision.BFLOAT16]
+    assert any(not torch.equal(single[name], halved[name]) for name in single)
+    torch.testing.assert_close(halved["loss"], single["loss"], rtol=0.05, atol=0)
