@@ -1,14 +1,16 @@
-"""Train the paper's variants with equal budgets, and compare them.
+"""Train the paper's variants, and what is beyond the paper, with equal budgets.
 
+    python scripts/make_training_data.py rooms
     python scripts/bench_variants.py rooms/ --watch middlebury/ --work build/variants
 
-Unfiltered PatchMatch, its 5 x 5 median, Unet-stereo (images only), ResDepth-0, -mono,
--stereo and -stereo_iter (paper, section "Network Variants"): the paper's networks,
-narrower, and its plain L1 loss, with a learning rate that fits the budget. Only
-unfiltered maps are learnt from, and no rule is applied after a network. Scenes are held
-out as a whole. Goes on where it stopped. The figures go to
-docs/measurements/variants.json; then `python scripts/make_tables.py` puts them into the
-documents.
+The paper's part: unfiltered PatchMatch, its 5 x 5 median, Unet-stereo (images only),
+ResDepth-0, -mono, -stereo and -stereo_iter (paper, section "Network Variants"): the
+paper's networks, narrower, and its plain L1 loss, with a learning rate that fits the
+budget. The part beyond it begins with ResDepth-stereo and adds one thing after the
+other. Each view counts with the map that a refinement starts from; a scene without maps
+is matched in a copy. No rule is applied after a network. Scenes are held out as a
+whole. Goes on where it stopped. The figures go to docs/measurements/variants.json and
+beyond.json; then `python scripts/make_tables.py` puts them into the documents.
 """
 
 import argparse
@@ -17,14 +19,15 @@ import datetime
 import json
 import logging
 import shutil
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from resdepth_colmap.config import RefineConfig
+from resdepth_colmap.config import RefineConfig, StereoConfig
 from resdepth_colmap.evaluation.depth_metrics import depth_metrics, median_filtered
 from resdepth_colmap.evaluation.tables import HARDWARE
-from resdepth_colmap.evaluation.variant_tables import variants_table
+from resdepth_colmap.evaluation.variant_tables import beyond_table, variants_table
 from resdepth_colmap.io.depth_map import write_depth_map
 from resdepth_colmap.network.network_config import (
     InputVariant,
@@ -33,28 +36,55 @@ from resdepth_colmap.network.network_config import (
 )
 from resdepth_colmap.network.unet import ResDepthNet
 from resdepth_colmap.network.weights import load_weights
+from resdepth_colmap.pipeline.initial_map import choose_initial_map
 from resdepth_colmap.pipeline.refine import ViewInputs, refine_view
 from resdepth_colmap.pipeline.versions import versions
 from resdepth_colmap.scene import DepthMap
-from resdepth_colmap.training.labelled_views import LabelledView, labelled_views
+from resdepth_colmap.training.labelled_views import labelled_views
 from resdepth_colmap.training.loop import train
-from resdepth_colmap.training.scenes import check_apart, find_scenes, split_scenes
+from resdepth_colmap.training.scenes import (
+    check_apart,
+    find_scenes,
+    scene_name,
+    split_scenes,
+)
 from resdepth_colmap.training.train_config import Preset, Schedule, TrainConfig
 
 REPOSITORY = Path(__file__).resolve().parents[1]
-RESULT = REPOSITORY / "docs" / "measurements" / "variants.json"
-VARIANTS = {
-    "unet_stereo": InputVariant.IMAGES_ONLY,
-    "resdepth_0": InputVariant.DEPTH_ONLY,
-    "resdepth_mono": InputVariant.MONO,
-    "resdepth_stereo": InputVariant.STEREO,
-}
-ITERATED = "resdepth_stereo_iter"
+RESULTS = REPOSITORY / "docs" / "measurements"
 MEASURES = ("mae", "rmse", "medae", "bad_2")
+SHARED = ("images", "sparse", "ground_truth")
+STEREO, ITERATED = "resdepth_stereo", "resdepth_stereo_iter"
 REFINED_KIND = "refined"
 
 # The networks by themselves.
 REFINING = RefineConfig(passes=1, keep_confirmed=False)
+
+
+class Options(NamedTuple):
+    """What a variant changes, of the network and of its training."""
+
+    network: Mapping[str, Any] = {}
+    training: Mapping[str, Any] = {}
+
+
+PAPER = {
+    "unet_stereo": Options({"variant": InputVariant.IMAGES_ONLY}),
+    "resdepth_0": Options({"variant": InputVariant.DEPTH_ONLY}),
+    "resdepth_mono": Options({"variant": InputVariant.MONO}),
+    STEREO: Options({"variant": InputVariant.STEREO}),
+}
+ADDITIONS = {
+    "robust": Options({"normalisation": Normalisation.ROBUST}),
+    "inputs": Options({"valid": True, "photo_consistency": True}),
+    "last_block": Options({"last_block": True}),
+    "gate": Options({"gate": True}),
+    "loss": Options(training={"relative": True, "log_weight": 0.1}),
+    "confidence": Options({"confidence": True}, {"confidence_weight": 0.05}),
+    "source_depth": Options({"source_depth": True}),
+    "holes": Options(training={"holes_share": TrainConfig.holes_share}),
+}
+"""Beyond the paper; each row keeps what those before it have."""
 
 
 class Budget(NamedTuple):
@@ -62,6 +92,47 @@ class Budget(NamedTuple):
 
     network: NetworkConfig
     training: TrainConfig
+
+
+class Trainer(NamedTuple):
+    """Trains variants on the same scenes, or takes what an earlier call has trained."""
+
+    scenes: Sequence[Path]
+    work: Path
+    budget: Budget
+
+    def network(self, name: str, options: Options) -> ResDepthNet:
+        """One variant, trained."""
+        print(f"training {name}", flush=True)
+        start = time.monotonic()
+        network = dataclasses.replace(self.budget.network, **options.network)
+        training = dataclasses.replace(self.budget.training, **options.training)
+        weights = train(self.scenes, self.work / name, network, training)
+        print(f"{name}: {time.monotonic() - start:.0f} s", flush=True)
+        return load_weights(weights)
+
+
+def lean_copies(scenes: Sequence[Path], folder: Path) -> list[Path]:
+    """Workspaces that share all with these, but have one map a view."""
+    return [_copied(scene, folder, _keep_initial_maps) for scene in scenes]
+
+
+def refined_copies(
+    scenes: Sequence[Path], network: ResDepthNet, folder: Path
+) -> list[Path]:
+    """Workspaces that share all with these, but whose depth maps are refined."""
+
+    def refine_maps(scene: Path, copy: Path) -> None:
+        maps = copy / "stereo" / "depth_maps"
+        maps.mkdir(parents=True)
+        for view in labelled_views(scene):
+            loaded = view.load(network.config.num_sources)
+            if loaded is not None:
+                depth = refined_by([network], loaded.inputs)
+                path = maps / f"{view.image_name}.{REFINED_KIND}.bin"
+                write_depth_map(path, depth)
+
+    return [_copied(scene, folder, refine_maps) for scene in scenes]
 
 
 def refined_by(networks: Sequence[ResDepthNet], view: ViewInputs) -> DepthMap:
@@ -72,53 +143,44 @@ def refined_by(networks: Sequence[ResDepthNet], view: ViewInputs) -> DepthMap:
     return view.depth
 
 
-def train_variant(
-    name: str, variant: InputVariant, scenes: Sequence[Path], work: Path, budget: Budget
-) -> ResDepthNet:
-    """Train one variant, or take what an earlier call has trained."""
-    print(f"training {name}", flush=True)
-    network = dataclasses.replace(budget.network, variant=variant)
-    return load_weights(train(scenes, work / name, network, budget.training))
+def _copied(scene: Path, folder: Path, fill: Callable[[Path, Path], None]) -> Path:
+    """A copy without stereo/ that is then filled; one that is there stays as it is."""
+    copy = folder / scene_name(scene)
+    if not copy.is_dir():
+        partial = folder / f".{copy.name}"
+        shutil.rmtree(partial, ignore_errors=True)
+        partial.mkdir(parents=True)
+        for part in SHARED:
+            (partial / part).symlink_to((scene / part).resolve())
+        fill(scene, partial)
+        partial.rename(copy)
+    return copy
 
 
-def refined_copies(
-    scenes: Sequence[Path], network: ResDepthNet, folder: Path
-) -> list[Path]:
-    """Workspaces that share all with these, but whose depth maps are refined."""
-    copies = []
-    for scene in scenes:
-        copy = folder / scene.name
-        copies.append(copy)
-        if (copy / "stereo").is_dir():
-            continue
-        copy.mkdir(parents=True, exist_ok=True)
-        for part in ("images", "sparse", "ground_truth"):
-            (copy / part).unlink(missing_ok=True)
-            (copy / part).symlink_to((scene / part).resolve())
-        partial = copy / "partial" / "depth_maps"
-        shutil.rmtree(partial.parent, ignore_errors=True)
-        for view in unfiltered(scene):
-            loaded = view.load(network.config.num_sources)
-            if loaded is not None:
-                depth = refined_by([network], loaded.inputs)
-                path = partial / f"{view.image_name}.{REFINED_KIND}.bin"
-                write_depth_map(path, depth)
-        partial.mkdir(parents=True, exist_ok=True)
-        partial.parent.rename(copy / "stereo")
-    return copies
-
-
-def unfiltered(scene: Path) -> list[LabelledView]:
-    """The views of a scene with their photometric maps."""
-    return [view for view in labelled_views(scene) if view.kind == "photometric"]
+def _keep_initial_maps(scene: Path, copy: Path) -> None:
+    """Link the maps, or match; only what a refinement starts from stays."""
+    maps = copy / "stereo" / "depth_maps"
+    maps.mkdir(parents=True)
+    there = (scene / "stereo" / "depth_maps").resolve()
+    for path in there.rglob("*.bin"):
+        link = maps / path.relative_to(there)
+        link.parent.mkdir(parents=True, exist_ok=True)
+        link.symlink_to(path)
+    views = labelled_views(copy, StereoConfig(filter=False))
+    for view in views:
+        kinds = [other.kind for other in views if other.index == view.index]
+        camera = view.scene.views[view.index].camera
+        best = choose_initial_map(view.workspace, view.image_name, camera, kinds)
+        if view.kind != best.kind:
+            view.map_path.unlink()
 
 
 def measure(
-    scenes: Sequence[Path], arms: dict[str, list[ResDepthNet]]
+    scenes: Sequence[Path], arms: Mapping[str, Sequence[ResDepthNet]]
 ) -> dict[str, Any]:
     """Errors of each arm on each view, and their means."""
     errors: dict[str, dict[str, dict[str, float]]] = {}
-    for view in (view for scene in scenes for view in unfiltered(scene)):
+    for view in (view for scene in scenes for view in labelled_views(scene)):
         loaded = view.load(num_sources=1)
         if loaded is None:
             continue
@@ -129,8 +191,8 @@ def measure(
             metrics = depth_metrics(values, loaded.truth).to_mapping()
             kept = {key: round(metrics[key] or 0.0, 6) for key in MEASURES}
             errors.setdefault(name, {})[view.name] = kept
-        print(f"measured {view.name}", flush=True)
     return {
+        "num_scenes": len(scenes),
         "num_views": len(next(iter(errors.values()), {})),
         "arms": {name: _summary(errors[name], errors["unfiltered"]) for name in errors},
     }
@@ -153,17 +215,36 @@ def _mean(values: list[float]) -> float:
     return round(sum(values) / len(values), 6)
 
 
-def train_all(scenes: Sequence[Path], work: Path, budget: Budget) -> dict[str, Any]:
-    """All variants; of each arm the networks that are applied one after the other."""
-    arms = {
-        name: [train_variant(name, variant, scenes, work, budget)]
-        for name, variant in VARIANTS.items()
-    }
-    (stereo,) = arms["resdepth_stereo"]
-    copies = refined_copies(scenes, stereo, work / "refined_scenes")
-    variant = InputVariant.STEREO
-    again = train_variant(ITERATED, variant, copies, work, budget)
+Arms = dict[str, list[ResDepthNet]]
+"""By name the networks that are applied one after the other."""
+
+
+def paper_arms(trainer: Trainer) -> Arms:
+    """The paper's variants."""
+    arms = {name: [trainer.network(name, PAPER[name])] for name in PAPER}
+    (stereo,) = arms[STEREO]
+    copies = refined_copies(trainer.scenes, stereo, trainer.work / "refined_scenes")
+    again = trainer._replace(scenes=copies).network(ITERATED, PAPER[STEREO])
     return {**arms, ITERATED: [stereo, again]}
+
+
+def beyond_arms(trainer: Trainer) -> Arms:
+    """ResDepth-stereo, what is added to it, and what two passes add to that."""
+    arms = {STEREO: [trainer.network(STEREO, PAPER[STEREO])]}
+    options = PAPER[STEREO]
+    for name, more in ADDITIONS.items():
+        options = Options(
+            {**options.network, **more.network}, {**options.training, **more.training}
+        )
+        arms[name] = [trainer.network(name, options)]
+    arms["two_passes"] = 2 * arms[name]
+    return arms
+
+
+PARTS = {
+    "variants": (paper_arms, variants_table),
+    "beyond": (beyond_arms, beyond_table),
+}
 
 
 def parsed() -> argparse.Namespace:
@@ -172,64 +253,72 @@ def parsed() -> argparse.Namespace:
     parser.add_argument("scenes", type=Path, nargs="+")
     parser.add_argument("--watch", type=Path, nargs="*", default=[])
     parser.add_argument("--work", type=Path, required=True, help="weights and samples")
-    parser.add_argument("--steps", type=int, default=3000)
-    parser.add_argument("--width", type=int, default=16, help="base channels")
-    kinds = [str(kind) for kind in Normalisation]
-    parser.add_argument("--normalisation", choices=kinds, default="baseline")
+    parser.add_argument("--parts", nargs="+", choices=PARTS, default=list(PARTS))
+    parser.add_argument("--steps", type=int, default=600)
+    parser.add_argument("--width", type=int, default=8, help="base channels")
     parser.add_argument("--levels", type=int, default=NetworkConfig.levels)
-    parser.add_argument("--crop-px", type=int, default=TrainConfig.crop_px)
+    parser.add_argument("--crop-px", type=int, default=256)
     parser.add_argument("--learning-rate", type=float, default=1e-3)
-    parser.add_argument("--held-out", type=float, default=0.1, help="share of scenes")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--held-out", type=float, default=0.15, help="share of scenes")
     parser.add_argument("--hardware", default=HARDWARE)
-    parser.add_argument("--output", type=Path, default=RESULT)
+    parser.add_argument("--output", type=Path, default=RESULTS, help="folder")
     return parser.parse_args()
+
+
+def budget_of(arguments: argparse.Namespace) -> Budget:
+    """The paper's network and training, at the size that was asked for."""
+    network = dataclasses.replace(
+        NetworkConfig.paper(),
+        base_channels=arguments.width,
+        max_channels=8 * arguments.width,
+        levels=arguments.levels,
+    )
+    changes = {
+        "steps": arguments.steps,
+        "crop_px": arguments.crop_px,
+        "learning_rate": arguments.learning_rate,
+        "schedule": Schedule.ONE_CYCLE,
+        "seed": arguments.seed,
+        "holes_share": 0.0,
+        "validation_share": 0.0,
+        "tensorboard": False,
+        "samples": arguments.work / "samples",
+    }
+    return Budget(network, TrainConfig.of(Preset.PAPER, changes))
 
 
 def main() -> None:
     """Read the command line, train, measure, print and write."""
     arguments = parsed()
     logging.basicConfig(level=logging.INFO, format="%(message)s")
-    budget = Budget(
-        network=dataclasses.replace(
-            NetworkConfig.paper(),
-            base_channels=arguments.width,
-            max_channels=8 * arguments.width,
-            levels=arguments.levels,
-            normalisation=arguments.normalisation,
-        ),
-        training=TrainConfig.of(
-            Preset.PAPER,
-            {
-                "steps": arguments.steps,
-                "crop_px": arguments.crop_px,
-                "learning_rate": arguments.learning_rate,
-                "schedule": Schedule.ONE_CYCLE,
-                "holes_share": 0.0,
-                "validation_share": 0.0,
-                "tensorboard": False,
-                "samples": arguments.work / "samples",
-            },
-        ),
-    )
+    budget, work = budget_of(arguments), arguments.work
     scenes, watched = find_scenes(arguments.scenes), find_scenes(arguments.watch)
     check_apart(scenes, watched)
-    split = split_scenes(scenes, arguments.held_out)
-    arms = train_all(split.training, arguments.work, budget)
-    sets = {"rendered": split.held_out, "middlebury": watched}
-    measured = {
-        "command": "python scripts/bench_variants.py",
-        "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
-        "hardware": arguments.hardware,
-        "versions": versions(),
-        "num_scenes": len(split.training),
-        "steps": arguments.steps,
-        "network": budget.network.to_mapping(),
-        "training": {**budget.training.to_mapping(), "samples": None},
-        "sets": {name: measure(paths, arms) for name, paths in sets.items() if paths},
+    split = split_scenes(lean_copies(scenes, work / "scenes"), arguments.held_out)
+    sets = {
+        "rendered": split.held_out,
+        "middlebury": lean_copies(watched, work / "watched"),
     }
-    arguments.output.parent.mkdir(parents=True, exist_ok=True)
-    arguments.output.write_text(json.dumps(measured, indent=2) + "\n", "utf-8")
-    print(variants_table(measured))
+    trainer = Trainer(split.training, work, budget)
+    arguments.output.mkdir(parents=True, exist_ok=True)
+    for part in arguments.parts:
+        make_arms, table = PARTS[part]
+        arms = make_arms(trainer)
+        measured = {
+            "command": "python scripts/bench_variants.py",
+            "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
+            "hardware": arguments.hardware,
+            "versions": versions(),
+            "num_scenes": len(split.training),
+            "steps": arguments.steps,
+            "network": budget.network.to_mapping(),
+            "training": {**budget.training.to_mapping(), "samples": None},
+            "sets": {key: measure(paths, arms) for key, paths in sets.items() if paths},
+        }
+        text = json.dumps(measured, indent=2) + "\n"
+        (arguments.output / f"{part}.json").write_text(text, "utf-8")
+        print(table(measured))
 
 
 if __name__ == "__main__":

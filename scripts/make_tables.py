@@ -2,19 +2,26 @@
 
     python scripts/make_tables.py
 
-Run it after a bench script; a test fails while documents and figures differ.
+Run it after a bench script, or after other weights were put into the package (their
+figures go to docs/measurements/weights.json); a test fails while documents and figures
+differ.
 """
 
+import json
 from pathlib import Path
 
 from resdepth_colmap.evaluation.tables import DOCUMENTS, filled_in, rendered
+from resdepth_colmap.evaluation.weights_facts import weights_facts
+from resdepth_colmap.network.weights import default_weights_path
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 MEASUREMENTS = REPOSITORY / "docs" / "measurements"
 
 
 def main() -> None:
-    """Fill in each document that is there."""
+    """Look at the weights, and fill in each document that is there."""
+    facts = json.dumps(weights_facts(default_weights_path()), indent=2)
+    (MEASUREMENTS / "weights.json").write_text(facts + "\n", "utf-8")
     for document in DOCUMENTS:
         path = REPOSITORY / document
         if not path.is_file():

@@ -20,7 +20,8 @@ from resdepth_colmap.evaluation.markdown import (
     percent,
 )
 from resdepth_colmap.evaluation.matching_tables import matching_table
-from resdepth_colmap.evaluation.variant_tables import variants_table
+from resdepth_colmap.evaluation.model_card import training_table, weights_table
+from resdepth_colmap.evaluation.variant_tables import beyond_table, variants_table
 
 DEPTHS = {"unfiltered": "unfiltered", "median": "5 x 5 median", "refined": "refined"}
 
@@ -147,12 +148,19 @@ DOCUMENTS: dict[str, dict[str, Renderer]] = {
         "workspaces": workspaces_table,
         "refine": refine_table,
         "variants": variants_table,
+        "beyond": beyond_table,
         "middlebury_rough": middlebury_summary,
         "commands": command_table,
         "cloud": cloud_table,
         "matching": matching_table,
         "compare": comparison_table,
         "stereo_memory": stereo_memory_table,
+    },
+    "docs/model_card.md": {
+        "weights": weights_table,
+        "training": training_table,
+        "middlebury": middlebury_summary,
+        "middlebury_rough": middlebury_summary,
     },
 }
 """The documents, and who renders the place of each name from the file of that name."""

@@ -1,4 +1,4 @@
-"""The table of the paper's variants, and whether their order is the paper's."""
+"""The tables of the paper's variants, and of what was added to the paper."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -14,6 +14,19 @@ ARMS = {
     "resdepth_stereo": "ResDepth-stereo",
     "resdepth_stereo_iter": "ResDepth-stereo_iter",
 }
+BEYOND = {
+    "unfiltered": "unfiltered PatchMatch",
+    "resdepth_stereo": "ResDepth-stereo (the paper's)",
+    "robust": "+ robust normalisation",
+    "inputs": "+ validity and photo-consistency as inputs",
+    "last_block": "+ last block at full resolution",
+    "gate": "+ learned gate",
+    "loss": "+ relative and logarithmic loss",
+    "confidence": "+ confidence head (Laplace likelihood)",
+    "source_depth": "+ depth map of the source, carried over",
+    "holes": "+ filtered and unfiltered maps in one network",
+    "two_passes": "the same, two passes with shared weights",
+}
 SETS = {"rendered": "held-out rendered scenes", "middlebury": "Middlebury"}
 
 WORST_FIRST = (
@@ -28,22 +41,28 @@ WORST_FIRST = (
 
 def variants_table(measured: Mapping[str, Any]) -> str:
     """One row a variant and set: errors, and the means of their ratios."""
-    network = measured["network"]
-    training = (
-        f"Each variant: {measured['steps']:,} steps of "
-        f"{measured['training']['batch_size']} crops from {measured['num_scenes']} "
-        "rendered scenes, "
-        f"{network['base_channels']} to {network['max_channels']} channels."
-    )
-    measured_by = (
-        f"Measured by `{measured['command']}` on {measured['date']}, "
-        f"{measured['hardware']}."
-    )
-    parts = [f"{measured_by} {training}"]
+    parts = [_measured_by(measured)]
     for name, label in SETS.items():
         if name in measured["sets"]:
             parts += _set_parts(label, measured["sets"][name])
     return "\n\n".join(parts)
+
+
+def beyond_table(measured: Mapping[str, Any]) -> str:
+    """One row an addition: the ratios, and what is off, on each set."""
+    sets = {key: measured["sets"][key] for key in SETS if key in measured["sets"]}
+    columns = [
+        f"{label}: {SETS[key]}, {result['num_views']} views" if place == 0 else label
+        for key, result in sets.items()
+        for place, label in enumerate(("MAE ratio", "MedAE ratio", "off by > 2 %"))
+    ]
+    rows = [
+        [label, *(cell for it in sets.values() for cell in _ratios(it["arms"][name]))]
+        for name, label in BEYOND.items()
+        if all(name in result["arms"] for result in sets.values())
+    ]
+    table = markdown_table(" | ".join(["network", *columns]), rows)
+    return "\n\n".join([_measured_by(measured), table])
 
 
 def out_of_order(maes: Mapping[str, float]) -> list[tuple[str, str]]:
@@ -59,6 +78,18 @@ def out_of_order(maes: Mapping[str, float]) -> list[tuple[str, str]]:
         for better in names[place + 1 :]
         if maes[worse] < maes[better]
     ]
+
+
+def _measured_by(measured: Mapping[str, Any]) -> str:
+    network, training = measured["network"], measured["training"]
+    return (
+        f"Measured by `{measured['command']}` on {measured['date']}, "
+        f"{measured['hardware']}. Each network: {measured['steps']:,} steps of "
+        f"{training['batch_size']} crops of {training['crop_px']} px from "
+        f"{measured['num_scenes']} rendered scenes, learning rate "
+        f"{training['learning_rate']:g}, {network['base_channels']} to "
+        f"{network['max_channels']} channels."
+    )
 
 
 def _set_parts(label: str, result: Mapping[str, Any]) -> Sequence[str]:
@@ -88,4 +119,12 @@ def _cells(arm: Mapping[str, Any]) -> list[str]:
         percent(arm["bad_2"]),
         number(arm["mae_ratio"], digits=2),
         number(arm["medae_ratio"], digits=2),
+    ]
+
+
+def _ratios(arm: Mapping[str, Any]) -> list[str]:
+    return [
+        number(arm["mae_ratio"], digits=2),
+        number(arm["medae_ratio"], digits=2),
+        percent(arm["bad_2"]),
     ]
