@@ -1,16 +1,21 @@
 """Measure the memory of the CPU PatchMatch by the number of views, and its start.
 
-    python scripts/bench_stereo_memory.py [--views 12 100] [--skip-start]
+    python scripts/bench_stereo_memory.py [--size 1632 1224] [--views 12] [--skip-start]
 
-Views of 2 megapixels of noise in a row, six sources each, both passes, filtered; few
-sweeps with a small window, as memory depends on neither. Each run is a process of its
-own. The start is what passes from the call of the program to the first progress, with
-the default options on views of 640 x 480: cold, with nothing compiled, and warm. Writes
-docs/measurements/stereo_memory.json; then `python scripts/make_tables.py` puts the
-figures into the documents.
+Views of noise in a row, six sources each, both passes, filtered; few sweeps with a
+small window, as memory depends on neither. Each run is a process of its own. For views
+of another size than 2 megapixels `cache_size` is scaled with the pixels, so that as
+many images and maps are kept as there: a hundred views of 2 megapixels take more than
+an hour of a processor, and whether memory grows with the number of views shows on small
+ones, too. The start is what passes from the call of the program to the first progress,
+with the default options on views of 640 x 480: cold, with nothing compiled, and warm.
+
+Writes docs/measurements/stereo_memory.json, where what was measured of other sizes
+stays; then `python scripts/make_tables.py` puts the figures into the documents.
 """
 
 import argparse
+import contextlib
 import datetime
 import json
 import os
@@ -18,6 +23,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -28,9 +34,10 @@ from PIL import Image
 REPOSITORY = Path(__file__).resolve().parents[1]
 RESULT = REPOSITORY / "docs" / "measurements" / "stereo_memory.json"
 LARGE_PX = (1632, 1224)
-SMALL_PX = (640, 480)
+START_PX = (640, 480)
 NUM_SOURCES = 6
 CHEAP = {"num_iterations": 1, "window_radius": 1, "window_step": 1}
+Keep = Callable[[dict[str, Any]], None]
 DEPTHS = {"depth_min": 2.0, "depth_max": 8.0}
 
 
@@ -69,48 +76,77 @@ class Started(BaseException):
     """The first progress was made."""
 
 
-def run_child(workspace: Path, options: dict[str, Any], until_progress: bool) -> None:
-    """Match a workspace in this process and print its peak of memory, or "started"."""
-    import contextlib
-    from collections.abc import Iterator
+class MemoryPeaks:
+    """The progress of a run; it notes the peak of memory in each tenth of it.
 
+    The peak of the process before the first progress, when compiled kernels are loaded,
+    hides what comes after it, so Linux is told to begin anew at each step.
+
+    Attributes:
+        ends_at_once: Whether to raise `Started` at the first progress.
+        tenths_mb: Peaks in MiB, shape (10,); those of the first step are left out.
+    """
+
+    def __init__(self, ends_at_once: bool) -> None:
+        """Nothing is noted yet."""
+        self.ends_at_once = ends_at_once
+        self.tenths_mb = [0.0] * 10
+
+    @contextlib.contextmanager
+    def stage(self, title: str, total: int) -> Iterator[Callable[[float], None]]:
+        """See `pipeline.progress.Progress`."""
+        done = 0.0
+
+        def advance(units: float) -> None:
+            nonlocal done
+            if self.ends_at_once:
+                raise Started
+            tenth = min(int(10 * done / total), 9)
+            if done > 0:
+                self.tenths_mb[tenth] = max(self.tenths_mb[tenth], step_peak_mb())
+            Path("/proc/self/clear_refs").write_text("5")
+            done += units
+
+        yield advance
+
+
+def step_peak_mb() -> float:
+    """The peak of this process since /proc/self/clear_refs was written, in MiB."""
+    for line in Path("/proc/self/status").read_text().splitlines():
+        if line.startswith("VmHWM:"):
+            return int(line.split()[1]) / 1024
+    raise OSError("/proc/self/status tells no VmHWM: this needs Linux")
+
+
+def run_child(workspace: Path, options: dict[str, Any], ends_at_once: bool) -> None:
+    """Match a workspace in this process and print its peaks of memory."""
     from resdepth_colmap.config import StereoBackend, StereoConfig
     from resdepth_colmap.io.model import read_scene
     from resdepth_colmap.io.workspace import open_workspace
-    from resdepth_colmap.pipeline.progress import Advance, Progress, SilentProgress
     from resdepth_colmap.pipeline.stereo import stereo_workspace
     from resdepth_colmap.pipeline.versions import peak_memory_mb
 
-    class First:
-        """Ends all at the first progress."""
-
-        @contextlib.contextmanager
-        def stage(self, title: str, total: int) -> Iterator[Advance]:
-            def advance(units: float) -> None:
-                raise Started
-
-            yield advance
-
-    progress: Progress = First() if until_progress else SilentProgress()
+    peaks = MemoryPeaks(ends_at_once)
     opened = open_workspace(workspace)
     scene = read_scene(opened.sparse_path, opened.images_path, opened.path)
     with contextlib.suppress(Started):
         stereo_workspace(
-            opened, scene, StereoConfig(**options), StereoBackend.CPU, progress=progress
+            opened, scene, StereoConfig(**options), StereoBackend.CPU, progress=peaks
         )
-    print(json.dumps({"peak_memory_mb": peak_memory_mb()}))
+    found = {"whole_memory_mb": peak_memory_mb(), "tenths_mb": peaks.tenths_mb}
+    print(json.dumps(found))
 
 
 def child(
-    workspace: Path, options: dict[str, Any], cache: Path | None, until_progress: bool
-) -> dict[str, float]:
+    workspace: Path, options: dict[str, Any], cache: Path | None, ends_at_once: bool
+) -> dict[str, Any]:
     """Run `run_child` in a process; its seconds, and what it printed."""
     environment = dict(os.environ)
     if cache is not None:
         environment["NUMBA_CACHE_DIR"] = str(cache)
     words = [sys.executable, __file__, "--child", str(workspace), json.dumps(options)]
-    if until_progress:
-        words.append("--until-progress")
+    if ends_at_once:
+        words.append("--end-at-once")
     start = time.perf_counter()
     done = subprocess.run(
         words, env=environment, stdout=subprocess.PIPE, check=True, text=True
@@ -119,69 +155,100 @@ def child(
     return {"seconds": round(seconds, 1), **json.loads(done.stdout)}
 
 
-def measure_memory(num_views: int) -> dict[str, Any]:
-    """The peak of memory of so many views."""
+def measure_memory(
+    num_views: int, size_px: tuple[int, int], options: dict[str, Any]
+) -> dict[str, Any]:
+    """The peaks of memory of so many views of a size."""
     with tempfile.TemporaryDirectory() as folder:
         workspace = Path(folder) / "dense"
-        write_workspace(workspace, num_views, LARGE_PX)
-        run = child(workspace, {**CHEAP, **DEPTHS}, None, until_progress=False)
-    peak_mb = round(run["peak_memory_mb"])
-    return {"views": num_views, "peak_memory_mb": peak_mb, "seconds": run["seconds"]}
+        write_workspace(workspace, num_views, size_px)
+        run = child(workspace, {**CHEAP, **DEPTHS, **options}, None, False)
+    return {
+        "views": num_views,
+        "peak_memory_mb": round(run["whole_memory_mb"], 1),
+        "tenths_mb": [round(peak, 1) for peak in run["tenths_mb"]],
+        "seconds": run["seconds"],
+    }
+
+
+def scaled_cache(size_px: tuple[int, int]) -> float:
+    """The `cache_size` that keeps as many images of a size as the default of 2 MP."""
+    from resdepth_colmap.config import StereoConfig
+
+    num_pixels, num_large = (width * height for width, height in (size_px, LARGE_PX))
+    return StereoConfig().cache_size * num_pixels / num_large
 
 
 def measure_start() -> dict[str, float]:
     """Seconds to the first progress, with nothing compiled and with everything."""
     with tempfile.TemporaryDirectory() as folder:
         workspace, cache = Path(folder) / "dense", Path(folder) / "cache"
-        write_workspace(workspace, 1 + NUM_SOURCES, SMALL_PX)
+        write_workspace(workspace, 1 + NUM_SOURCES, START_PX)
         cold, warm = (
-            child(workspace, DEPTHS, cache, until_progress=True)["seconds"]
+            child(workspace, DEPTHS, cache, ends_at_once=True)["seconds"]
             for _ in range(2)
         )
     return {"cold_s": cold, "warm_s": warm}
 
 
-def main() -> None:
-    """Read the command line, measure, print and write."""
+def measure_series(arguments: argparse.Namespace, keep: Keep) -> None:
+    """Run after run of a size; each is kept when it is done."""
+    from resdepth_colmap.pipeline.versions import versions
+
+    width_px, height_px = arguments.size
+    words = ["--size", *map(str, arguments.size), "--views", *map(str, arguments.views)]
+    options = {"cache_size": scaled_cache((width_px, height_px))}
+    series: dict[str, Any] = {
+        "command": " ".join(["python", "scripts/bench_stereo_memory.py", *words]),
+        "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
+        "versions": versions(),
+        "options": {**CHEAP, "num_sources": NUM_SOURCES, **options},
+        "runs": [],
+    }
+    for number in arguments.views:
+        run = measure_memory(number, (width_px, height_px), options)
+        series["runs"].append(run)
+        keep({"sizes": {f"{width_px} x {height_px}": series}})
+
+
+def parsed() -> argparse.Namespace:
+    """The command line."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--views", type=int, nargs="*", default=[12, 100])
+    parser.add_argument("--size", type=int, nargs=2, default=LARGE_PX)
+    parser.add_argument("--views", type=int, nargs="*", default=[12])
     parser.add_argument("--skip-start", action="store_true")
     parser.add_argument("--output", type=Path, default=RESULT)
     parser.add_argument("--child", nargs=2, metavar=("WORKSPACE", "OPTIONS"))
-    parser.add_argument("--until-progress", action="store_true")
-    arguments = parser.parse_args()
+    parser.add_argument("--end-at-once", action="store_true")
+    return parser.parse_args()
+
+
+def main() -> None:
+    """Read the command line, measure, print and write."""
+    arguments = parsed()
     if arguments.child:
         path, options = arguments.child
-        run_child(Path(path), json.loads(options), arguments.until_progress)
+        run_child(Path(path), json.loads(options), arguments.end_at_once)
         return
-    from resdepth_colmap.pipeline.versions import versions
-
     output: Path = arguments.output
-    views = ["--views", *map(str, arguments.views)] if arguments.views else []
-    measured = json.loads(output.read_text("utf-8")) if output.exists() else {}
-    measured |= {
-        "command": " ".join(["python", "scripts/bench_stereo_memory.py", *views]),
-        "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
-        "versions": versions(),
-        "options": {**CHEAP, "num_sources": NUM_SOURCES, "size_px": LARGE_PX},
-    }
+
+    def keep(part: dict[str, Any]) -> None:
+        kept = json.loads(output.read_text("utf-8")) if output.exists() else {}
+        sizes = {**kept.get("sizes", {}), **part.get("sizes", {})}
+        write_down({**kept, **part, "sizes": sizes}, output)
+
     if not arguments.skip_start:
-        measured["start"] = measure_start()
-        keep(measured, output)
-    runs: list[dict[str, Any]] = []
-    for number in arguments.views:
-        runs.append(measure_memory(number))
-        keep({**measured, "memory": runs}, output)
+        keep({"start": measure_start()})
+    measure_series(arguments, keep)
 
 
-def keep(measured: dict[str, Any], output: Path) -> None:
-    """Write down what was measured so far, and print it."""
-    from resdepth_colmap.evaluation.tables import stereo_memory_table
+def write_down(measured: dict[str, Any], output: Path) -> None:
+    """Write what was measured so far, and print it."""
+    from resdepth_colmap.evaluation.matching_memory_table import stereo_memory_table
 
     output.parent.mkdir(parents=True, exist_ok=True)
     output.write_text(json.dumps(measured, indent=2) + "\n", "utf-8")
-    if "memory" in measured:
-        print(stereo_memory_table(measured), flush=True)
+    print(stereo_memory_table(measured), flush=True)
 
 
 if __name__ == "__main__":

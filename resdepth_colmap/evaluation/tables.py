@@ -19,6 +19,7 @@ from resdepth_colmap.evaluation.markdown import (
     number,
     percent,
 )
+from resdepth_colmap.evaluation.matching_memory_table import stereo_memory_table
 from resdepth_colmap.evaluation.matching_tables import matching_table
 from resdepth_colmap.evaluation.model_card import training_table, weights_table
 from resdepth_colmap.evaluation.variant_tables import beyond_table, variants_table
@@ -116,27 +117,6 @@ def refine_table(measured: Measured) -> str:
     ]
     header = "size, px | megapixels | s a megapixel and pass | s of each repetition"
     return "\n\n".join([_measured_by(measured), markdown_table(header, rows)])
-
-
-def stereo_memory_table(measured: Measured) -> str:
-    """Memory of the matcher by the number of views, and how soon it starts."""
-    width_px, height_px = measured["options"]["size_px"]
-    rows = [
-        [str(run["views"]), f"{run['peak_memory_mb'] / 1024:.2f}"]
-        for run in measured["memory"]
-    ]
-    header = f"views of {width_px} x {height_px} px | peak memory, GiB"
-    parts = [
-        f"Measured by `{measured['command']}` on {measured['date']}, {HARDWARE}.",
-        markdown_table(header, rows),
-    ]
-    if "start" in measured:
-        start = measured["start"]
-        parts.append(
-            f"From the call of the program to the first progress: {start['cold_s']:.0f}"
-            f" s with nothing compiled, {start['warm_s']:.1f} s later."
-        )
-    return "\n\n".join(parts)
 
 
 Renderer = Callable[[Measured], str]

@@ -12,7 +12,6 @@ from resdepth_colmap.evaluation.tables import (
     middlebury_table,
     refine_table,
     rendered,
-    stereo_memory_table,
     workspaces_table,
 )
 
@@ -147,19 +146,3 @@ def test_a_broken_place_is_refused(text: str) -> None:
 
 def test_what_was_not_measured_has_no_text(tmp_path: Path) -> None:
     assert rendered("docs/benchmarks.md", tmp_path) == {}
-
-
-def test_memory_is_told_by_the_number_of_views_and_the_start_where_measured() -> None:
-    measured = {
-        "command": "python x.py",
-        "date": "2026-01-02",
-        "options": {"size_px": [1632, 1224]},
-        "memory": [{"views": 12, "peak_memory_mb": 1024}],
-    }
-    text = stereo_memory_table(measured)
-    assert "| 12 | 1.00 |" in text
-    assert "compiled" not in text
-    start = {"cold_s": 30.4, "warm_s": 2.34}
-    assert "30 s with nothing compiled, 2.3 s" in stereo_memory_table(
-        {**measured, "start": start}
-    )
