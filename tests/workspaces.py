@@ -19,10 +19,15 @@ def plane_folder(path: Path, **options: object) -> Path:
     return folder
 
 
-def identity_weights(path: Path, seed: int = 0) -> Path:
-    """Weights of a small fresh network, which returns its input depth."""
+def identity_weights(path: Path, seed: int = 0, source_depth: bool = False) -> Path:
+    """Weights of a small fresh network, which returns its input depth.
+
+    What a network is given that looks at the maps of other views is no longer what was
+    in the file: its input is completed.
+    """
     torch.manual_seed(seed)
-    network = ResDepthNet(NetworkConfig(levels=2, base_channels=4))
-    file = path / f"{seed}-{WEIGHTS_NAME}"
+    config = NetworkConfig(levels=2, base_channels=4, source_depth=source_depth)
+    network = ResDepthNet(config)
+    file = path / f"{seed}-{source_depth}-{WEIGHTS_NAME}"
     save_weights(file, network)
     return file

@@ -5,7 +5,6 @@ the plain baseline, and refined depth; residuals beyond a limit are discarded.
 """
 
 import dataclasses
-import itertools
 import time
 from collections.abc import Mapping
 
@@ -23,6 +22,7 @@ from resdepth_colmap.evaluation.depth_regions import edge_region
 from resdepth_colmap.evaluation.pooled_metrics import ErrorSample
 from resdepth_colmap.network.unet import ResDepthNet
 from resdepth_colmap.pipeline.refine import SourceView, ViewInputs, refine_view
+from resdepth_colmap.pipeline.source_maps import SourceMap
 
 ARMS = ("unfiltered", "median", "refined")
 REGIONS = ("all", "edges", "flat")
@@ -99,7 +99,6 @@ def measure_case(
 
 
 def _inputs(case: DepthCase, initial: InitialDepth) -> ViewInputs:
-    depths = initial.source_depths[: len(case.sources)]
     return ViewInputs(
         depth=initial.depth,
         gray=case.reference.gray,
@@ -109,9 +108,17 @@ def _inputs(case: DepthCase, initial: InitialDepth) -> ViewInputs:
                 gray=source.gray,
                 K=source.K,
                 source_from_reference=source_from_reference(case, source),
-                depth=depth,
             )
-            for source, depth in itertools.zip_longest(case.sources, depths)
+            for source in case.sources
+        ),
+        source_maps=tuple(
+            SourceMap(
+                depth=depth,
+                K=source.K,
+                source_from_reference=source_from_reference(case, source),
+            )
+            for source, depth in zip(case.sources, initial.source_depths, strict=False)
+            if depth is not None
         ),
     )
 

@@ -7,11 +7,12 @@ then each tile is cut out and normalised by itself, as the paper centres its pat
 import math
 from typing import NamedTuple, Self
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn.functional import avg_pool2d
 
-from resdepth_colmap.geometry.forward_warp import carry_inverse_depth
 from resdepth_colmap.geometry.holes import fill_holes
 from resdepth_colmap.geometry.inverse_depth import invert_map
 from resdepth_colmap.geometry.warp import warp_to_reference
@@ -22,7 +23,7 @@ from resdepth_colmap.network.network_config import (
     Normalisation,
 )
 from resdepth_colmap.network.unet import INPUT_LIMIT
-from resdepth_colmap.scene import DepthMap
+from resdepth_colmap.scene import DepthMap, FloatMap
 
 NCC_WINDOW_PX = 7
 NCC_VARIANCE_FLOOR = 4e-6  # (half a grey level of 255) squared: weaker is noise
@@ -30,7 +31,7 @@ NO_EVIDENCE = 0.5  # photo-consistency of a correlation of 0
 LEAST_VALID_SHARE = 0.05  # below it, filled pixels count in the statistics too
 LEAST_RELATIVE_SPREAD = 0.02  # of the median: a fronto-parallel wall has no spread
 STATISTICS_SIDE_PX = 256  # quantiles of more pixels than that squared cost only time
-LARGEST_CHANGE = 4.0  # relative, of what the source's map says; more is an outlier
+LARGEST_CHANGE = 4.0  # relative, of what another map says; more is an outlier
 DEFAULT_BASELINE_RATIO = 0.1  # baseline over depth where there is no second view
 
 
@@ -41,14 +42,11 @@ class SourceTensors(NamedTuple):
         gray: Grey values in 0..1, shape (B, 1, Hs, Ws).
         K: K for index coordinates, shape (B, 3, 3), in pixels.
         source_from_reference: Pose, shape (B, 3, 4), translation in units.
-        inverse_depth: Its own depth map at the size of the image, shape (B, 1, Hs, Ws),
-            in 1/unit; 0 = hole. None = there is no such map.
     """
 
     gray: Tensor
     K: Tensor
     source_from_reference: Tensor
-    inverse_depth: Tensor | None = None
 
 
 class ViewTensors(NamedTuple):
@@ -60,6 +58,8 @@ class ViewTensors(NamedTuple):
         gray: Grey values of the reference in 0..1, shape (B, 1, H, W).
         K: K of the reference for index coordinates, shape (B, 3, 3), in pixels.
         sources: Second views, best first; may be empty.
+        carried: What the depth maps of other views say, shape (B, 1, H, W), in 1/unit;
+            0 = nothing. None = there are no such maps.
     """
 
     inverse_depth: Tensor
@@ -67,6 +67,7 @@ class ViewTensors(NamedTuple):
     gray: Tensor
     K: Tensor
     sources: tuple[SourceTensors, ...]
+    carried: Tensor | None = None
 
 
 class InputStack(NamedTuple):
@@ -116,22 +117,20 @@ class Scaling(NamedTuple):
         return normalised * self.scale + self.offset
 
 
-def initial_tensors(depth: DepthMap) -> tuple[Tensor, Tensor]:
-    """The two tensors that a depth map becomes.
+def initial_maps(depth: DepthMap) -> tuple[FloatMap, NDArray[np.bool_]]:
+    """What a depth map becomes.
 
     Args:
         depth: Initial depth, shape (H, W), in units; 0 = hole.
 
     Returns:
-        Inverse depth with its holes filled, shape (1, 1, H, W), float32, in 1/unit; and
-        where the depth was real, same shape, bool.
+        Inverse depth with its holes filled, shape (H, W), float32, in 1/unit; and where
+        the depth was real, shape (H, W).
 
     Raises:
         ValueError: If no pixel is valid.
     """
-    valid = torch.from_numpy(invert_map(depth) > 0)
-    filled = torch.from_numpy(invert_map(fill_holes(depth)))
-    return filled[None, None], valid[None, None]
+    return invert_map(fill_holes(depth)), invert_map(depth) > 0
 
 
 def build_inputs(view: ViewTensors, config: NetworkConfig) -> InputStack:
@@ -175,24 +174,6 @@ def warp_sources(view: ViewTensors, num_sources: int) -> list[tuple[Tensor, Tens
         )
         for source in view.sources[:num_sources]
     ]
-
-
-def carried_inverse_depth(view: ViewTensors) -> Tensor:
-    """The first source's depth map in the reference camera.
-
-    Shape (B, 1, H, W), in 1/unit; 0 where none of its depths arrives, and everywhere
-    without such a map.
-    """
-    source = view.sources[0] if view.sources else None
-    if source is None or source.inverse_depth is None:
-        return torch.zeros_like(view.inverse_depth)
-    return carry_inverse_depth(
-        source.inverse_depth,
-        source.K,
-        view.K,
-        source.source_from_reference,
-        (view.inverse_depth.shape[-2], view.inverse_depth.shape[-1]),
-    )
 
 
 def photo_consistency(reference: Tensor, warped: list[tuple[Tensor, Tensor]]) -> Tensor:
@@ -270,10 +251,12 @@ def network_input(stack: InputStack, config: NetworkConfig) -> tuple[Tensor, Sca
 
 
 def _carried_channels(view: ViewTensors) -> dict[str, Tensor]:
-    """Relative difference of what the source's map says, and where it says anything."""
-    carried = carried_inverse_depth(view)
-    is_there = carried > 0
-    change = carried / view.inverse_depth - 1.0
+    """Relative difference of what the maps say, and where they say anything."""
+    if view.carried is None:
+        nothing = torch.zeros_like(view.gray)
+        return {CARRIED_CHANGE: nothing, CARRIED: nothing}
+    is_there = view.carried > 0
+    change = view.carried / view.inverse_depth - 1.0
     change = torch.where(is_there, change, 0.0).clamp(max=LARGEST_CHANGE)
     return {CARRIED_CHANGE: change, CARRIED: is_there.to(view.gray.dtype)}
 

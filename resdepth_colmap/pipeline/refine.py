@@ -2,13 +2,16 @@
 
 import contextlib
 import dataclasses
+import math
 from collections.abc import Iterator
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from resdepth_colmap.config import RefineConfig
+from resdepth_colmap.geometry.completion import complete_from_background
 from resdepth_colmap.geometry.inverse_depth import invert_map
 from resdepth_colmap.geometry.normals import normals_from_depth
 from resdepth_colmap.network.unet import ResDepthNet
@@ -17,11 +20,16 @@ from resdepth_colmap.pipeline.inputs import (
     SourceTensors,
     ViewTensors,
     build_inputs,
-    carried_inverse_depth,
-    initial_tensors,
+    initial_maps,
     network_input,
     photo_consistency,
     warp_sources,
+)
+from resdepth_colmap.pipeline.source_maps import (
+    SourceMap,
+    carried_inverse_depth,
+    confirmed_by,
+    goes_along_rows,
 )
 from resdepth_colmap.pipeline.tiling import Window, apply_tiled, pad_to_multiple
 from resdepth_colmap.scene import DepthMap, FloatMap, GrayImage, Matrix, NormalMap
@@ -40,11 +48,11 @@ LOG_SCALE_LIMIT = 12.0
 KEPT_CONSISTENCY = 0.15
 """Photo-consistency (NCC of 0.7) up to which the photographs confirm a depth."""
 
-KEPT_AGREEMENT = 0.01
-"""Relative difference up to which the source's own depth map confirms a depth."""
-
 FILTERED_SHARE = 0.95
 """A map with less of its pixels filled has been filtered."""
+
+LEAST_CONFIRMED_SHARE = 0.05
+"""Other views' maps that confirm less of a map are of no use."""
 
 KEPT_CHANGE = 0.05
 """Relative change that is no correction of an outlier: a confirmed depth stays."""
@@ -58,21 +66,11 @@ class SourceView:
         gray: Its image, of any size, shape (Hs, Ws), in 0..1.
         K: K for index coordinates of that size, shape (3, 3), in pixels.
         source_from_reference: Pose, shape (3, 4), translation in units.
-        depth: Its own depth map, shape (Hs, Ws), in units; 0 = hole. None = unknown.
     """
 
     gray: GrayImage
     K: Matrix
     source_from_reference: Matrix
-    depth: DepthMap | None = None
-
-    def __post_init__(self) -> None:
-        """Check that image and depth map have one size."""
-        if self.depth is not None and self.gray.shape != self.depth.shape:
-            raise ValueError(
-                f"{self.gray.shape=} but expected that of the depth map, "
-                f"{self.depth.shape}."
-            )
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
@@ -84,12 +82,15 @@ class ViewInputs:
         gray: The image at the size of the depth map, shape (H, W), in 0..1.
         K: K for index coordinates at that size, shape (3, 3), in pixels.
         sources: Second views, best first; may be empty.
+        source_maps: Depth maps of other views, the first that of the best; may be
+            empty.
     """
 
     depth: DepthMap
     gray: GrayImage
     K: Matrix
     sources: tuple[SourceView, ...] = ()
+    source_maps: tuple[SourceMap, ...] = ()
 
     def __post_init__(self) -> None:
         """Check that image and depth map have one size."""
@@ -141,7 +142,7 @@ def refine_view(
     """
     device = next(network.parameters()).device
     with _inference(network):
-        tensors = view_tensors(view, device)
+        tensors = view_tensors(view, device, network.config.source_depth)
         measured = tensors.inverse_depth[tensors.valid]
         low = float(measured.min()) * LEAST_INVERSE_RATIO
         high = float(measured.max()) * LARGEST_INVERSE_RATIO
@@ -215,16 +216,34 @@ def _refine_tile(tile: InputStack, network: ResDepthNet) -> Tensor:
     return torch.cat([change, torch.exp(log_scale) * scaling.scale], dim=1)
 
 
-def view_tensors(view: ViewInputs, device: torch.device) -> ViewTensors:
+def view_tensors(view: ViewInputs, device: torch.device, use_maps: bool) -> ViewTensors:
     """A view as tensors on a device, a batch of one.
+
+    Args:
+        view: The view.
+        device: Where to.
+        use_maps: Look at the maps of other views: what none of them confirms is
+            completed from the background, and no longer valid.
 
     Raises:
         ValueError: If the initial depth map has no valid pixel.
     """
-    inverse_depth, valid = initial_tensors(view.depth)
+    inverse_depth, valid = initial_maps(view.depth)
+    carried = None
+    if use_maps and view.source_maps:
+        carried = carried_inverse_depth(inverse_depth, view.K, view.source_maps)
+        is_known = valid & confirmed_by(inverse_depth, carried)
+        if is_known.sum() < LEAST_CONFIRMED_SHARE * valid.sum():
+            carried = None  # maps of other scenes, or of failed pairs
+        elif not _is_filtered(valid):
+            along_rows = goes_along_rows(view.source_maps[0], view.K, valid.shape)
+            inverse_depth = complete_from_background(
+                inverse_depth, is_known, along_rows
+            )
+            valid = is_known
     return ViewTensors(
-        inverse_depth=inverse_depth.to(device),
-        valid=valid.to(device),
+        inverse_depth=_image(inverse_depth, device),
+        valid=torch.from_numpy(valid)[None, None].to(device),
         gray=_image(view.gray, device),
         K=torch.from_numpy(view.K)[None],
         sources=tuple(
@@ -232,10 +251,10 @@ def view_tensors(view: ViewInputs, device: torch.device) -> ViewTensors:
                 _image(source.gray, device),
                 torch.from_numpy(source.K)[None],
                 torch.from_numpy(source.source_from_reference)[None],
-                None if source.depth is None else _inverse_depth(source.depth, device),
             )
             for source in view.sources
         ),
+        carried=None if carried is None else _image(carried, device),
     )
 
 
@@ -243,28 +262,26 @@ def _image(gray: GrayImage, device: torch.device) -> Tensor:
     return torch.from_numpy(np.array(gray, dtype=np.float32))[None, None].to(device)
 
 
-def _inverse_depth(depth: DepthMap, device: torch.device) -> Tensor:
-    return torch.from_numpy(invert_map(depth))[None, None].to(device)
-
-
 def _confirmed(tensors: ViewTensors, config: RefineConfig) -> Tensor:
     """Where the initial depth is real and its filter or a source vouches for it.
 
     Shape (B, 1, H, W), bool. A map with holes was filtered: what its filter left was
-    consistent over several views, which says more than one second view can. A source
-    vouches by its photograph or by a depth map of its own that says the same.
+    consistent over several views, which says more than one second view can. Where there
+    are maps of other views, what none of them confirms is not valid any more.
     """
     if not config.keep_confirmed:
         return torch.zeros_like(tensors.valid)
-    if float(tensors.valid.float().mean()) < FILTERED_SHARE:
+    if tensors.carried is not None or _is_filtered(tensors.valid):
         return tensors.valid
     if not tensors.sources:
         return torch.zeros_like(tensors.valid)
     warped = warp_sources(tensors, 1)
     is_good = photo_consistency(tensors.gray, warped) < KEPT_CONSISTENCY
-    change = carried_inverse_depth(tensors) - tensors.inverse_depth
-    is_good |= change.abs() < KEPT_AGREEMENT * tensors.inverse_depth
     return is_good & tensors.valid
+
+
+def _is_filtered(valid: NDArray[np.bool_] | Tensor) -> bool:
+    return float(valid.sum()) < FILTERED_SHARE * math.prod(valid.shape)
 
 
 def _correlation(tensors: ViewTensors, num_sources: int) -> Tensor:

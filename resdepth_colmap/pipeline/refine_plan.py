@@ -29,12 +29,14 @@ class ViewPlan:
         index: Its place in the scene.
         kinds: The maps to choose from.
         sources: Its second views, best first; () for a network that needs none.
+        map_sources: Positions of the views whose depth maps are looked at.
         fingerprint: A hash of all that its refined map depends on.
     """
 
     index: int
     kinds: tuple[str, ...]
     sources: tuple[SourceChoice, ...]
+    map_sources: tuple[int, ...]
     fingerprint: str
 
 
@@ -42,7 +44,7 @@ def plan_views(
     workspace: Workspace,
     scene: Scene,
     requested: str,
-    num_sources: int,
+    nums: tuple[int, int],
     options: dict[str, Any],
 ) -> tuple[tuple[ViewPlan, ...], Skipped]:
     """Decide what each image is refined from, without reading a map.
@@ -52,7 +54,8 @@ def plan_views(
         scene: The views. An explicit list of sources in patch-match.cfg is what the
             second views are chosen from; else all views are.
         requested: The kind of map to start from, or auto.
-        num_sources: Second views that the network looks at; may be 0.
+        nums: Second views that the network looks at, and maps of other views that are
+            looked at; each may be 0.
         options: What else decides the result: it becomes part of the hash.
 
     Returns:
@@ -62,6 +65,7 @@ def plan_views(
         WorkspaceError: If patch-match.cfg is malformed.
     """
     listed = _listed_sources(workspace, scene)
+    num_sources, num_maps = nums
     plans, skipped = [], []
     for index, view in enumerate(scene.views):
         kinds = candidate_kinds(workspace, view.name, requested)
@@ -69,16 +73,21 @@ def plan_views(
             skipped.append((view.name, _no_map(workspace, view.name, requested)))
             continue
         sources: tuple[SourceChoice, ...] = ()
-        if num_sources:
-            sources = choose_sources(scene, index, num_sources, listed.get(view.name))
-            if not sources:
-                skipped.append((view.name, "no other view overlaps with it"))
-                continue
-        fingerprint = _fingerprint(workspace, scene, (index, kinds, sources), options)
+        if num_sources or num_maps:
+            most = max(num_sources, num_maps)
+            sources = choose_sources(scene, index, most, listed.get(view.name))
+        if num_sources and not sources:
+            skipped.append((view.name, "no other view overlaps with it"))
+            continue
         plan = ViewPlan(
-            index=index, kinds=kinds, sources=sources, fingerprint=fingerprint
+            index=index,
+            kinds=kinds,
+            sources=sources[:num_sources],
+            map_sources=tuple(choice.index for choice in sources[:num_maps]),
+            fingerprint="",
         )
-        plans.append(plan)
+        fingerprint = _fingerprint(workspace, scene, plan, options)
+        plans.append(dataclasses.replace(plan, fingerprint=fingerprint))
     return tuple(plans), tuple(skipped)
 
 
@@ -112,21 +121,18 @@ def _no_map(workspace: Workspace, name: str, requested: str) -> str:
 
 
 def _fingerprint(
-    workspace: Workspace,
-    scene: Scene,
-    inputs: tuple[int, tuple[str, ...], tuple[SourceChoice, ...]],
-    options: dict[str, Any],
+    workspace: Workspace, scene: Scene, plan: ViewPlan, options: dict[str, Any]
 ) -> str:
-    index, kinds, sources = inputs
-    view = scene.views[index]
-    views = [view, *(scene.views[source.index] for source in sources)]
+    view = scene.views[plan.index]
+    views = [view, *(scene.views[source.index] for source in plan.sources)]
+    others = [scene.views[index] for index in plan.map_sources]
     facts = {
         "package": importlib.metadata.version("resdepth-colmap"),
         "options": options,
         "views": [_facts_of(v) for v in views],
         "images": _stamps(workspace.image_path(v.name) for v in views),
-        "maps": [kinds, _stamps(map_path(workspace, view.name, k) for k in kinds)],
-        "source_maps": [_map_stamps(workspace, v.name) for v in views[1:]],
+        "maps": [plan.kinds, _map_stamps(workspace, view.name, plan.kinds)],
+        "source_maps": [[_facts_of(v), _map_stamps(workspace, v.name)] for v in others],
     }
     text = json.dumps(facts, sort_keys=True, default=str)
     return hashlib.sha256(text.encode()).hexdigest()
@@ -137,8 +143,11 @@ def _facts_of(view: View) -> list[Any]:
     return [view.name, camera, view.cam_from_world.tolist()]
 
 
-def _map_stamps(workspace: Workspace, name: str) -> list[tuple[int, int]]:
-    kinds = workspace.original_kinds(name)
+def _map_stamps(
+    workspace: Workspace, name: str, kinds: Iterable[str] | None = None
+) -> list[tuple[int, int]]:
+    """Those of the maps of an image, of these kinds or of all."""
+    kinds = workspace.original_kinds(name) if kinds is None else kinds
     return _stamps(map_path(workspace, name, kind) for kind in kinds)
 
 

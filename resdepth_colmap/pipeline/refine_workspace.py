@@ -27,6 +27,7 @@ from resdepth_colmap.pipeline.initial_map import (
 from resdepth_colmap.pipeline.progress import Progress, SilentProgress
 from resdepth_colmap.pipeline.refine import RefinedView, refine_view
 from resdepth_colmap.pipeline.refine_plan import Skipped, ViewPlan, plan_views
+from resdepth_colmap.pipeline.source_maps import NUM_SOURCE_MAPS
 from resdepth_colmap.pipeline.view_images import ViewImages
 from resdepth_colmap.pipeline.view_inputs import view_inputs
 from resdepth_colmap.scene import DepthMap, Scene
@@ -111,7 +112,10 @@ def refine_workspace(
         "in_place": in_place,
     }
     num_sources = network.config.num_sources if network.config.uses_sources else 0
-    plans, skipped = plan_views(workspace, scene, config.input, num_sources, options)
+    num_maps = NUM_SOURCE_MAPS if network.config.source_depth else 0
+    plans, skipped = plan_views(
+        workspace, scene, config.input, (num_sources, num_maps), options
+    )
     output = OutputWorkspace(source=workspace, in_place=in_place)
     output.prepare([view.name for view in scene.views])
     loop = _Loop(workspace, scene, config, network, output)
@@ -198,7 +202,7 @@ class _Loop:
             sources,
             initial.depth,
             self.view_images,
-            self._source_depth if self.network.config.source_depth else None,
+            self._maps_of_others(plan),
         )
         result = refine_view(inputs, self.network, self.config)
         self.output.write_maps(
@@ -210,13 +214,18 @@ class _Loop:
         self._save()
         return ""
 
-    def _source_depth(self, index: int) -> DepthMap | None:
-        """The map that a view starts from itself; None if it has none."""
-        view = self.scene.views[index]
-        kinds = candidate_kinds(self.workspace, view.name, self.config.input)
-        if not kinds:
-            return None
-        return choose_initial_map(self.workspace, view.name, view.camera, kinds).depth
+    def _maps_of_others(self, plan: ViewPlan) -> dict[int, DepthMap]:
+        """The maps that other views start from themselves."""
+        maps = {}
+        for index in plan.map_sources:
+            view = self.scene.views[index]
+            kinds = candidate_kinds(self.workspace, view.name, self.config.input)
+            if kinds:
+                found = choose_initial_map(
+                    self.workspace, view.name, view.camera, kinds
+                )
+                maps[index] = found.depth
+        return maps
 
     def _save(self) -> None:
         self.record = {**self.record, RECORD_KEY: self.images}
@@ -239,6 +248,7 @@ def _image_record(
             {"name": scene.views[choice.index].name, **_choice_facts(choice)}
             for choice in plan.sources
         ],
+        "source_maps": [scene.views[index].name for index in plan.map_sources],
         "filled_before": round(initial.filled, 6),
         "filled_after": round(float(np.mean(result.depth > 0)), 6),
         "median_relative_change": round(change, 6),

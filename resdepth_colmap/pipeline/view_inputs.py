@@ -1,12 +1,12 @@
 """One view of a workspace, as arrays ready to be refined."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 
 from resdepth_colmap.geometry.pixels import index_K
-from resdepth_colmap.geometry.resize import nearest_depth
 from resdepth_colmap.pipeline.refine import SourceView, ViewInputs
+from resdepth_colmap.pipeline.source_maps import SourceMap
 from resdepth_colmap.pipeline.view_images import ViewImages, camera_at_scale
-from resdepth_colmap.scene import DepthMap, Scene, cam_from_cam
+from resdepth_colmap.scene import DepthMap, Scene, View, cam_from_cam
 
 
 def view_inputs(
@@ -15,7 +15,7 @@ def view_inputs(
     sources: Sequence[int],
     depth: DepthMap,
     images: ViewImages,
-    depth_of: Callable[[int], DepthMap | None] | None = None,
+    maps: Mapping[int, DepthMap] | None = None,
 ) -> ViewInputs:
     """The view at the size of its map, its sources at the same scale.
 
@@ -26,8 +26,7 @@ def view_inputs(
         depth: Initial depth, shape (H, W), in units; 0 = hole. It may be smaller than
             the image.
         images: Loads the images.
-        depth_of: Gives the depth map of the view at a position, of any size of the
-            image's shape; None for a view that has none. None = none has.
+        maps: Depth maps of other views by their positions, best first, of any size.
 
     Raises:
         WorkspaceError: If an image is missing or cannot be read.
@@ -40,16 +39,11 @@ def view_inputs(
     for source_index in sources:
         source = scene.views[source_index]
         source_camera = camera_at_scale(source.camera, scale)
-        gray = images.gray(source, source_camera)
-        source_depth = None if depth_of is None else depth_of(source_index)
-        if source_depth is not None:
-            source_depth = nearest_depth(source_depth, gray.shape)
         second_views.append(
             SourceView(
-                gray=gray,
+                gray=images.gray(source, source_camera),
                 K=index_K(source_camera),
                 source_from_reference=cam_from_cam(source, view),
-                depth=source_depth,
             )
         )
     return ViewInputs(
@@ -57,4 +51,17 @@ def view_inputs(
         gray=images.gray(view, camera),
         K=index_K(camera),
         sources=tuple(second_views),
+        source_maps=tuple(
+            _source_map(scene.views[other], view, source_depth)
+            for other, source_depth in (maps or {}).items()
+        ),
+    )
+
+
+def _source_map(source: View, reference: View, depth: DepthMap) -> SourceMap:
+    height_px, width_px = depth.shape
+    return SourceMap(
+        depth=depth,
+        K=index_K(source.camera.resized(width_px, height_px)),
+        source_from_reference=cam_from_cam(source, reference),
     )

@@ -13,13 +13,11 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from resdepth_colmap.errors import TrainingError
-from resdepth_colmap.network.network_config import (
-    CARRIED,
-    CARRIED_CHANGE,
-    NetworkConfig,
-)
+from resdepth_colmap.network.network_config import NetworkConfig
 from resdepth_colmap.pipeline.inputs import InputStack, network_input
 from resdepth_colmap.training.samples import (
+    COMPLETED,
+    DENSE,
     HOLES,
     Sample,
     guidance_names,
@@ -31,8 +29,9 @@ NEAR_TRUTH_WEIGHT = (0.3, 3.0)
 """Range of the weight that turns errors of inverse depth into relative ones."""
 
 
-NO_SOURCE_DEPTH_SHARE = 0.15
-"""Share of crops that are not shown the source's depth map: users may have none."""
+ALONE_SHARE = 0.15
+"""Share of crops of a network that looks at the maps of other views for which there are
+none: users may have none."""
 
 
 class Batch(NamedTuple):
@@ -42,7 +41,9 @@ class Batch(NamedTuple):
         inputs: The network's input, shape (B, C, H, W).
         target: True inverse depth, normalised as the input is, shape (B, 1, H, W).
         known: Where there is truth, shape (B, 1, H, W), bool.
-        weight: Weight of each pixel, shape (B, 1, H, W).
+        weight: What turns an error of each pixel into the one that counts, shape (B, 1,
+            H, W).
+        importance: How much each pixel counts, shape (B, 1, H, W), 1 in the mean.
         names: Names of the samples of all processes, for the message when a loss is
             not a number.
     """
@@ -51,6 +52,7 @@ class Batch(NamedTuple):
     target: Tensor
     known: Tensor
     weight: Tensor
+    importance: Tensor
     names: tuple[str, ...]
 
     def to(self, device: torch.device) -> "Batch":
@@ -60,6 +62,7 @@ class Batch(NamedTuple):
             target=self.target.to(device),
             known=self.known.to(device),
             weight=self.weight.to(device),
+            importance=self.importance.to(device),
             names=self.names,
         )
 
@@ -77,6 +80,7 @@ class CropSampler:
         holes_share: Share of samples whose maps have holes.
         vary_light: Change brightness and contrast at random.
         relative: Weigh pixels so that their errors are relative to the depth.
+        valid_importance: How much a pixel of a valid depth counts, to one without.
     """
 
     paths: tuple[Path, ...]
@@ -87,6 +91,7 @@ class CropSampler:
     holes_share: float = 0.2
     vary_light: bool = True
     relative: bool = True
+    valid_importance: float = 1.0
 
     def batch(self, step: int, rank: int = 0, num_ranks: int = 1) -> Batch:
         """The batch of a step: crop, flip, change brightness, normalise.
@@ -121,6 +126,7 @@ class CropSampler:
             target=scaling.normalise(target),
             known=known,
             weight=weight.clamp(*NEAR_TRUTH_WEIGHT),
+            importance=self._importance(stack.valid),
             names=tuple(path.stem for path, _ in draws),
         )
 
@@ -131,11 +137,12 @@ class CropSampler:
         return hashlib.sha256(names.encode()).hexdigest()[:16]
 
     @functools.cached_property
-    def _pools(self) -> tuple[tuple[Path, ...], tuple[Path, ...]]:
-        """Samples without and with holes; neither is empty."""
-        holes = tuple(path for path in self.paths if path.stem.endswith(HOLES))
-        dense = tuple(path for path in self.paths if not path.stem.endswith(HOLES))
-        return dense or holes, holes or dense
+    def _pools(self) -> dict[str, tuple[Path, ...]]:
+        """The samples by the end of their names."""
+        return {
+            end: tuple(path for path in self.paths if path.stem.endswith(end))
+            for end in (DENSE, COMPLETED, HOLES)
+        }
 
     @functools.cached_property
     def _channels(self) -> list[int]:
@@ -144,11 +151,22 @@ class CropSampler:
         wanted = [name for name in self.config.channels if name != "inverse_depth"]
         return [names.index(name) for name in wanted]
 
+    def _importance(self, valid: Tensor) -> Tensor:
+        importance = torch.where(valid, self.valid_importance, 1.0)
+        return importance / importance.mean(dim=(1, 2, 3), keepdim=True)
+
     def _draw(self, step: int, item: int) -> tuple[Path, np.random.Generator]:
         """A sample, and what decides on its crop: the same in every process."""
         rng = np.random.default_rng((self.seed, step, item))
-        dense, holes = self._pools
-        pool = holes if rng.random() < self.holes_share else dense
+        own = COMPLETED if self.config.source_depth else DENSE
+        lot = (rng.random() - self.holes_share) / max(1.0 - self.holes_share, 1e-9)
+        if lot < 0.0:
+            kinds = (HOLES, own, DENSE)
+        elif lot < ALONE_SHARE:
+            kinds = (DENSE, own, HOLES)
+        else:
+            kinds = (own, DENSE, HOLES)
+        pool = next(self._pools[kind] for kind in kinds if self._pools[kind])
         return pool[int(rng.integers(len(pool)))], rng
 
     def _crop(
@@ -170,8 +188,6 @@ class CropSampler:
             return np.ascontiguousarray(cropped)
 
         guidance = cut(sample.guidance[self._channels]).astype(np.float32)
-        if rng.random() < NO_SOURCE_DEPTH_SHARE:
-            guidance = self._without_source_depth(guidance)
         if self.vary_light:
             guidance = self._other_light(guidance, rng)
         return Sample(
@@ -213,14 +229,6 @@ class CropSampler:
                 gray = np.clip(guidance[index], 0.0, 1.0) ** own
                 gray = gray * gain * np.exp(rng.normal(0.0, 0.05))
                 guidance[index] = np.clip(gray, 0.0, 1.0)
-        return guidance
-
-    def _without_source_depth(
-        self, guidance: NDArray[np.float32]
-    ) -> NDArray[np.float32]:
-        for name in (CARRIED_CHANGE, CARRIED):
-            if name in self.config.channels:
-                guidance[self.config.channels.index(name) - 1] = 0.0
         return guidance
 
 

@@ -87,6 +87,7 @@ def prepare_data(
             crop_px=config.crop_px,
             seed=config.seed,
             holes_share=config.holes_share,
+            valid_importance=config.valid_importance,
             vary_light=config.vary_light,
             relative=config.relative,
         )

@@ -4,6 +4,7 @@ Each map of a view counts by itself: unfiltered and filtered ones have other mis
 """
 
 import dataclasses
+import functools
 import logging
 from collections.abc import Sequence
 from pathlib import Path
@@ -24,6 +25,7 @@ from resdepth_colmap.pipeline.initial_map import (
 )
 from resdepth_colmap.pipeline.progress import Progress, SilentProgress
 from resdepth_colmap.pipeline.refine import ViewInputs
+from resdepth_colmap.pipeline.source_maps import NUM_SOURCE_MAPS
 from resdepth_colmap.pipeline.stereo import stereo_workspace
 from resdepth_colmap.pipeline.view_images import ViewImages
 from resdepth_colmap.pipeline.view_inputs import view_inputs
@@ -87,6 +89,16 @@ class LabelledView:
         """Its true depth map."""
         return self.workspace.truth_path(self.image_name)
 
+    @functools.cached_property
+    def other_map_paths(self) -> dict[int, Path]:
+        """The maps of its kind that are looked at, by the positions of their views."""
+        paths = {}
+        for choice in choose_sources(self.scene, self.index, NUM_SOURCE_MAPS):
+            name = self.scene.views[choice.index].name
+            if self.kind in candidate_kinds(self.workspace, name):
+                paths[choice.index] = map_path(self.workspace, name, self.kind)
+        return paths
+
     def load(self, num_sources: int) -> Loaded | None:
         """Read it with so many second views; None if its map is of a failed pair.
 
@@ -102,16 +114,9 @@ class LabelledView:
         choices = choose_sources(self.scene, self.index, num_sources)
         images = ViewImages(self.workspace, 1 + num_sources)
         sources = [choice.index for choice in choices]
-        maps = {index: self._map_of(index) for index in sources}
-        inputs = view_inputs(self.scene, self.index, sources, depth, images, maps.get)
+        maps = {i: read_depth_map(path) for i, path in self.other_map_paths.items()}
+        inputs = view_inputs(self.scene, self.index, sources, depth, images, maps)
         return Loaded(inputs, truth)
-
-    def _map_of(self, index: int) -> DepthMap | None:
-        """The map of the same kind of another view."""
-        name = self.scene.views[index].name
-        if self.kind not in candidate_kinds(self.workspace, name):
-            return None
-        return read_depth_map(map_path(self.workspace, name, self.kind))
 
 
 def labelled_views(

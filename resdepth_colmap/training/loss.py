@@ -53,4 +53,4 @@ def refinement_loss(refined: Refinement, batch: Batch, config: TrainConfig) -> L
         log_scale = refined.log_scale.clamp(-8.0, 4.0)
         likelihood = seen * torch.exp(-log_scale) + log_scale
         value = value + config.confidence_weight * likelihood
-    return LossSum((value * known).sum(), known.sum())
+    return LossSum((value * known * batch.importance).sum(), known.sum())

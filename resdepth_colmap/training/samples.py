@@ -4,12 +4,13 @@ What does not depend on the crop (warping, filling, correlation) is done once fo
 view and kept in a cache folder. A sample holds the channels of all variants.
 """
 
+import dataclasses
 import functools
 import hashlib
 import io
 import json
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -25,7 +26,7 @@ from resdepth_colmap.network.network_config import (
 )
 from resdepth_colmap.pipeline.inputs import build_inputs
 from resdepth_colmap.pipeline.progress import Progress, SilentProgress
-from resdepth_colmap.pipeline.refine import ViewInputs, view_tensors
+from resdepth_colmap.pipeline.refine import view_tensors
 from resdepth_colmap.scene import DepthMap
 from resdepth_colmap.training.labelled_views import LabelledView, Loaded, labelled_views
 
@@ -35,10 +36,11 @@ HOLES_CONSISTENCY = 0.25
 FILTERED_SHARE = 0.95
 """A map with less of its pixels filled has holes of its own."""
 
-DENSE, HOLES = "-dense", "-holes"
-"""How the names of samples end: of a map without and with holes."""
+DENSE, COMPLETED, HOLES = "-dense", "-completed", "-holes"
+"""How the names of samples end: of a map without holes, of one that the maps of other
+views have been compared with, and of a map with holes."""
 
-_FORMAT = 3
+_FORMAT = 4
 
 
 class Sample(NamedTuple):
@@ -73,9 +75,10 @@ def prepare_samples(
 ) -> list[Path]:
     """Build the samples of all views that have a depth map and a ground truth.
 
-    A map without holes gives two: as it is, and with holes where the photographs
-    contradict it, as a filter would leave it. Every map that is there is used,
-    unfiltered and filtered; a workspace without any is matched.
+    A map without holes gives three: as it is, compared with the maps of other views,
+    and with holes where the photographs contradict it, as a filter would leave it.
+    Every map that is there is used, unfiltered and filtered; a workspace without any is
+    matched.
 
     Args:
         scenes: Dense workspaces with `ground_truth/<image>.bin`.
@@ -100,9 +103,9 @@ def prepare_samples(
     return paths
 
 
-def build_sample(loaded: Loaded, num_sources: int) -> Sample:
-    """The sample of a view."""
-    tensors = view_tensors(loaded.inputs, torch.device("cpu"))
+def build_sample(loaded: Loaded, num_sources: int, use_maps: bool = True) -> Sample:
+    """The sample of a view, with or without a look at the maps of other views."""
+    tensors = view_tensors(loaded.inputs, torch.device("cpu"), use_maps)
     stack = build_inputs(tensors, NetworkConfig(num_sources=num_sources))
     alone = build_inputs(tensors._replace(sources=()), NetworkConfig())
     known = loaded.truth > 0
@@ -134,29 +137,35 @@ def sample_size(path: Path) -> tuple[int, int]:
 
 def _prepare_view(view: LabelledView, num_sources: int, folder: Path) -> list[Path]:
     stem = f"{view.name}-{_fingerprint(view)}"
-    dense, holes = (folder / f"{stem}{end}.npz" for end in (DENSE, HOLES))
-    if holes.exists():  # written last
-        return [path for path in (dense, holes) if path.exists()]
-    loaded = view.load(num_sources)
-    if loaded is None:
-        return []
-    sample = build_sample(loaded, num_sources)
-    if sample.valid.mean() < FILTERED_SHARE:
-        _write_sample(holes, sample)
-        return [holes]
-    _write_sample(dense, sample)
-    depth = _with_holes(loaded.inputs.depth, sample, num_sources)
-    if depth is None:
-        return [dense]
-    sample = build_sample(_with_depth(loaded, depth), num_sources)
-    _write_sample(holes, _without_carried(sample, depth, num_sources))
-    return [dense, holes]
+    paths = {end: folder / f"{stem}{end}.npz" for end in (DENSE, COMPLETED, HOLES)}
+    if not paths[HOLES].exists():  # written last
+        loaded = view.load(num_sources)
+        for end, sample in _samples(loaded, num_sources) if loaded else ():
+            _write_sample(paths[end], sample)
+    return [path for path in paths.values() if path.exists()]
+
+
+def _samples(loaded: Loaded, num_sources: int) -> Iterator[tuple[str, Sample]]:
+    """The samples of a view, each with the end of its name, the one with holes last."""
+    dense = build_sample(loaded, num_sources, use_maps=False)
+    if dense.valid.mean() < FILTERED_SHARE:
+        yield HOLES, build_sample(loaded, num_sources)
+        return
+    yield DENSE, dense
+    if loaded.inputs.source_maps:
+        yield COMPLETED, build_sample(loaded, num_sources)
+    depth = _with_holes(loaded.inputs.depth, dense, num_sources)
+    if depth is not None:
+        inputs = dataclasses.replace(loaded.inputs, depth=depth)
+        sample = build_sample(loaded._replace(inputs=inputs), num_sources)
+        yield HOLES, _without_carried(sample, depth, num_sources)
 
 
 def _fingerprint(view: LabelledView) -> str:
     """Changes when a file that the sample depends on does."""
     image_path = view.workspace.image_path(view.image_name)
-    paths = (view.map_path, view.truth_path, image_path)
+    others = view.other_map_paths.values()
+    paths = (view.map_path, view.truth_path, image_path, *others)
     states = [(path.stat().st_size, path.stat().st_mtime_ns) for path in paths]
     key = json.dumps([_FORMAT, str(view.workspace.path.resolve()), states])
     return hashlib.sha256(key.encode()).hexdigest()[:10]
@@ -169,15 +178,6 @@ def _without_carried(sample: Sample, depth: DepthMap, num_sources: int) -> Sampl
     for name in (CARRIED_CHANGE, CARRIED):
         guidance[names.index(name)][depth == 0] = 0
     return sample._replace(guidance=guidance)
-
-
-def _with_depth(loaded: Loaded, depth: DepthMap) -> Loaded:
-    inputs = loaded.inputs
-    return loaded._replace(
-        inputs=ViewInputs(
-            depth=depth, gray=inputs.gray, K=inputs.K, sources=inputs.sources
-        )
-    )
 
 
 def _with_holes(depth: DepthMap, sample: Sample, num_sources: int) -> DepthMap | None:

@@ -50,6 +50,9 @@ class TrainConfig(Config):
         schedule: Of the learning rate.
         largest_gradient: Norm that gradients are cut to; 0 = they are not.
         relative: Weigh errors by the true depth, so that all distances count alike.
+        valid_importance: How much a pixel counts whose depth was measured (and
+            confirmed by another map), to one that was filled in: the rule that keeps
+            what is confirmed looks after the former.
         log_weight: Weight of the logarithmic term, which keeps small errors small.
         confidence_weight: Weight of the likelihood of the predicted error scale.
         vary_light: Change brightness and contrast of the crops at random.
@@ -79,6 +82,7 @@ class TrainConfig(Config):
     schedule: Schedule = Schedule.ONE_CYCLE
     largest_gradient: float = 1.0
     relative: bool = True
+    valid_importance: float = 0.3
     log_weight: float = 0.1
     confidence_weight: float = 0.05
     vary_light: bool = True
@@ -159,6 +163,7 @@ _AT_LEAST_ONE = (
 _NOT_NEGATIVE = (
     "weight_decay",
     "largest_gradient",
+    "valid_importance",
     "log_weight",
     "confidence_weight",
 )
@@ -171,6 +176,7 @@ _PAPER: dict[str, Any] = {
     "schedule": Schedule.CONSTANT,
     "largest_gradient": 0.0,
     "relative": False,
+    "valid_importance": 1.0,
     "log_weight": 0.0,
     "confidence_weight": 0.0,
     "vary_light": False,

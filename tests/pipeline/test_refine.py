@@ -27,6 +27,7 @@ from resdepth_colmap.pipeline.refine import (
     ViewInputs,
     refine_view,
 )
+from resdepth_colmap.pipeline.source_maps import SourceMap
 from resdepth_colmap.scene import DepthMap, cam_from_cam
 
 SMALL = {"levels": 2, "base_channels": 4, "max_channels": 8}
@@ -258,32 +259,62 @@ def test_what_a_filter_left_stays_where_it_is_changed_a_little() -> None:
     np.testing.assert_array_equal(with_rule[~measured], without[~measured])
 
 
-def test_what_the_sources_own_map_confirms_stays() -> None:
-    initial = view()
+def maps_of(factors: list[float]) -> tuple[SourceMap, ...]:
+    """The source's own map of the plane, each time as far off as that."""
     reference, source = two_views()
-    exact, in_source = (
-        depth_of_plane(it, PLANE_NORMAL, PLANE_OFFSET) for it in (reference, source)
+    depth = depth_of_plane(source, PLANE_NORMAL, PLANE_OFFSET)
+    return tuple(
+        SourceMap(
+            depth=(factor * depth).astype(np.float32),
+            K=index_K(source.camera),
+            source_from_reference=cam_from_cam(source, reference),
+        )
+        for factor in factors
     )
-    grey = np.full_like(initial.gray, 0.5)  # no photograph confirms anything
-    unlike = np.full_like(initial.sources[0].gray, 0.5)
+
+
+def exact_view() -> ViewInputs:
+    """A right depth map, and photographs that confirm nothing."""
+    initial = view()
+    exact = depth_of_plane(two_views()[0], PLANE_NORMAL, PLANE_OFFSET)
+    source = initial.sources[0]
+    unlike = dataclasses.replace(source, gray=np.full_like(source.gray, 0.5))
+    return dataclasses.replace(
+        initial,
+        depth=exact.astype(np.float32),
+        gray=np.full_like(initial.gray, 0.5),
+        sources=(unlike,),
+    )
+
+
+def test_what_another_map_confirms_stays() -> None:
     kept = {}
+    initial = exact_view()
     for factor in (1.0, 1.05):
-        second = dataclasses.replace(
-            initial.sources[0],
-            gray=unlike,
-            depth=(factor * in_source).astype(np.float32),
-        )
-        initial = dataclasses.replace(
-            initial, depth=exact.astype(np.float32), gray=grey, sources=(second,)
-        )
-        with_rule, without = with_and_without_rule(initial)
-        little = np.abs(1 / without - 1 / exact) < 0.0499 / exact
-        seen = little & ~np.isclose(without, exact, rtol=1e-4)
-        kept[factor] = np.isclose(with_rule, exact, rtol=1e-6)[seen].mean()
+        looked = dataclasses.replace(initial, source_maps=maps_of([factor]))
+        with_rule, without = with_and_without_rule(looked)
+        changed = ~np.isclose(without, initial.depth, rtol=1e-4)
+        little = np.abs(initial.depth / without - 1) < 0.0499
+        same = np.isclose(with_rule, initial.depth, rtol=1e-6)
+        kept[factor] = same[changed & little].mean()
     assert kept[1.0] > 0.6
     assert kept[1.05] < 0.05
 
 
-def test_a_sources_map_of_another_size_than_its_image_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"\(10, 10\)"):
-        dataclasses.replace(view().sources[0], depth=np.ones((10, 10), np.float32))
+def test_what_no_map_confirms_is_completed_before_the_network() -> None:
+    initial = exact_view()
+    wrong = initial.depth.copy()
+    wrong[20:30, 30:34] *= 0.5
+    initial = dataclasses.replace(initial, depth=wrong, source_maps=maps_of([1.0, 1.3]))
+    exact = exact_view().depth
+    for options, limit in (({}, 0.1), ({"source_depth": False}, 0.5)):
+        refined = refine_view(initial, network(**options), TILES).depth
+        error = np.abs(refined / exact - 1)[20:30, 30:34]
+        assert error.max() == pytest.approx(limit, abs=0.1)
+
+
+def test_a_filtered_map_is_not_completed_from_the_background() -> None:
+    initial = dataclasses.replace(view(), source_maps=maps_of([1.3]))
+    refined = refine_view(initial, network(), TILES).depth
+    measured = initial.depth > 0
+    np.testing.assert_allclose(refined[measured], initial.depth[measured], rtol=2e-7)

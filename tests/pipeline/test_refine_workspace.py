@@ -171,14 +171,22 @@ def users_of(name: str, report: RefineReport) -> set[str]:
     }
 
 
-def test_a_changed_map_is_refined_again_and_those_that_look_at_it(
-    tmp_path: Path,
-) -> None:
+def test_a_changed_map_is_refined_again_and_nothing_else(tmp_path: Path) -> None:
     folder = plane_folder(tmp_path)
-    users = users_of(NAMES[3], refine(folder))
-    with_holes(map_path(folder, NAMES[3]), 5)
-    assert set(refine(folder).refined) == users
-    assert len(users) < len(NAMES)
+    refine(folder)
+    with_holes(map_path(folder, NAMES[0]), 5)
+    assert refine(folder).refined == (NAMES[0],)
+
+
+def test_whoever_looks_at_a_changed_map_is_refined_again_too(tmp_path: Path) -> None:
+    folder = plane_folder(tmp_path)
+    weights = identity_weights(tmp_path, source_depth=True)
+    images = refine(folder, weights=weights).images
+    lookers = {name for name, it in images.items() if NAMES[0] in it["source_maps"]}
+    assert lookers and NAMES[0] not in lookers
+    with_holes(map_path(folder, NAMES[0]), 5)
+    again = refine(folder, weights=weights)
+    assert set(again.refined) == {NAMES[0]} | lookers
 
 
 def test_a_lost_result_is_made_again_and_nothing_else(tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """Laws of the crops: what is cut, mirrored and dealt out."""
 
 import dataclasses
+from collections import Counter
 from pathlib import Path
 from unittest import mock
 
@@ -125,3 +126,34 @@ def test_light_changes_photographs_alone(samples: tuple[Path, ...]) -> None:
         is_photo = name in ("reference", "source_0")
         same = torch.equal(varied.inputs[:, index], plain.inputs[:, index])
         assert same != is_photo
+
+
+def test_what_was_measured_counts_less_and_the_mean_is_one(
+    samples: tuple[Path, ...],
+) -> None:
+    holes = tuple(path for path in samples if path.stem.endswith("-holes"))
+    batch = sampler_of(holes, valid_importance=0.25).batch(0)
+    torch.testing.assert_close(batch.importance.mean(dim=(1, 2, 3)), torch.ones(4))
+    valid = batch.inputs[:, [NETWORK.channels.index("valid")]] > 0
+    mixed = [i for i in range(4) if valid[i].any() and not valid[i].all()]
+    assert mixed
+    for index in mixed:
+        measured = batch.importance[index][valid[index]]
+        filled = batch.importance[index][~valid[index]]
+        torch.testing.assert_close(measured.max(), 0.25 * filled.min())
+    assert (sampler_of(holes).batch(0).importance == 1).all()
+
+
+def test_a_network_that_looks_at_other_maps_is_mostly_shown_them(
+    samples: tuple[Path, ...],
+) -> None:
+    blind = dataclasses.replace(NETWORK, source_depth=False)
+    ends = {}
+    for config in (NETWORK, blind):
+        sampler = sampler_of(samples, config=config, holes_share=0.3, batch_size=300)
+        names = [sampler._draw(0, item)[0].stem for item in range(300)]
+        ends[config] = Counter(name.rsplit("-", 1)[1] for name in names)
+    assert set(ends[NETWORK]) == {"completed", "dense", "holes"}
+    assert ends[NETWORK]["completed"] > 150 > 60 > ends[NETWORK]["dense"] > 10
+    assert set(ends[blind]) == {"dense", "holes"}
+    assert ends[blind]["holes"] == ends[NETWORK]["holes"]

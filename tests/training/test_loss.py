@@ -26,6 +26,7 @@ def batch() -> Batch:
         target=random(0),
         known=random(1) > 0,
         weight=random(2).abs() + 0.3,
+        importance=torch.ones(SHAPE),
         names=("a", "b"),
     )
 
@@ -105,3 +106,13 @@ def test_the_logarithm_weighs_small_errors_more(batch: Batch) -> None:
 
     assert gain(0.02, plain) == pytest.approx(gain(2.0, plain), rel=1e-2)
     assert gain(0.02, DEFAULT) > 2 * gain(2.0, DEFAULT)
+
+
+def test_a_pixel_counts_as_much_as_it_is_important(batch: Batch) -> None:
+    refined = refined_of(random(3), random(4))
+    halves = []
+    for part in (random(5) > 0, random(5) <= 0):
+        important = batch._replace(importance=part.float())
+        halves.append(refinement_loss(refined, important, DEFAULT).total)
+    whole = refinement_loss(refined, batch, DEFAULT).total
+    torch.testing.assert_close(halves[0] + halves[1], whole)

@@ -16,6 +16,7 @@ from resdepth_colmap.network.network_config import InputVariant, NetworkConfig
 from resdepth_colmap.training import labelled_views as labelled_views_module
 from resdepth_colmap.training.labelled_views import labelled_views
 from resdepth_colmap.training.samples import (
+    COMPLETED,
     DENSE,
     HOLES,
     guidance_names,
@@ -37,7 +38,8 @@ def test_unfiltered_and_filtered_maps_of_a_view_are_samples_of_their_own(
     scene = write_noisy_plane(tmp_path / "room", kinds=("photometric", "geometric"))
     paths = prepare_samples([scene], NETWORK, tmp_path / "cache")
     assert len(set(paths)) == len(paths)
-    for kind, ends in {"photometric": {DENSE, HOLES}, "geometric": {HOLES}}.items():
+    expected = {"photometric": {DENSE, COMPLETED, HOLES}, "geometric": {HOLES}}
+    for kind, ends in expected.items():
         own = [name for name in names_of(paths) if f"-{kind}-" in name]
         assert {"-" + name.rsplit("-", 1)[1] for name in own} == ends
         assert len(own) == len(NAMES) * len(ends)
@@ -49,7 +51,7 @@ def test_scenes_of_one_folder_name_do_not_share_samples(tmp_path: Path) -> None:
     scenes = [write_noisy_plane(tmp_path / name / "dense") for name in ("a", "b")]
     scenes.append(write_noisy_plane(tmp_path / "c" / "a" / "dense"))
     paths = prepare_samples(scenes, NETWORK, tmp_path / "cache")
-    assert len(set(paths)) == len(paths) == 3 * len(NAMES) * 2
+    assert len(set(paths)) == len(paths) == 3 * len(NAMES) * 3
 
 
 def test_a_sample_is_made_anew_when_its_map_changes_and_only_then(
@@ -65,8 +67,10 @@ def test_a_sample_is_made_anew_when_its_map_changes_and_only_then(
     write_depth_map(path, read_depth_map(path) * np.float32(1.01))
     os.utime(path, ns=(1, 1))
     changed = prepare_samples([scene], NETWORK, tmp_path / "cache")
-    assert len(set(changed) - set(first)) == 2
-    assert all("-3.png-" in path.stem for path in set(changed) - set(first))
+    new = {path.stem for path in set(changed) - set(first)}
+    assert sum("-3.png-" in stem for stem in new) == 3
+    # The others look at it; maps of another kind do not.
+    assert all("-photometric-" in stem for stem in new)
 
 
 def test_all_variants_share_their_samples(tmp_path: Path) -> None:

@@ -1,0 +1,52 @@
+"""Depth of what one view sees and no other: the background goes on behind the edge.
+
+Forward-backward check and background interpolation are those of semi-global matching
+(Hirschmueller, PAMI 2008, section 2.6): a pixel that the second view does not see lies
+beside something nearer, on the surface that this thing hides.
+"""
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from resdepth_colmap.scene import FloatMap
+
+SMOOTHED_PX = 5
+"""Window of the median over what was completed: rows are completed one by one."""
+
+
+def complete_from_background(
+    inverse_depth: FloatMap, known: npt.NDArray[np.bool_], along_rows: bool
+) -> FloatMap:
+    """Give unknown pixels the depth of the nearest known ones, the farther of two.
+
+    Args:
+        inverse_depth: Shape (H, W), float32, in 1/unit.
+        known: Which pixels have a depth to be trusted, shape (H, W).
+        along_rows: Look for them to the left and right; else above and below. The way
+            of the epipolar lines is the right one.
+
+    Returns:
+        Inverse depth, shape (H, W), float32: unchanged where known; where a line has
+        nothing known, the median of all that is, or the input if nothing is.
+    """
+    if known.all() or not known.any():
+        return inverse_depth
+    if not along_rows:
+        turned = complete_from_background(inverse_depth.T, known.T, along_rows=True)
+        return np.ascontiguousarray(turned.T)
+    before = _nearest_known(inverse_depth, known)
+    after = _nearest_known(inverse_depth[:, ::-1], known[:, ::-1])[:, ::-1]
+    background = np.fmin(before, after)
+    background[np.isnan(background)] = np.median(inverse_depth[known])
+    completed = np.where(known, inverse_depth, background).astype(np.float32)
+    smooth = cv2.medianBlur(completed, SMOOTHED_PX)
+    return np.where(known, inverse_depth, smooth).astype(np.float32)
+
+
+def _nearest_known(values: FloatMap, known: npt.NDArray[np.bool_]) -> FloatMap:
+    """Of each pixel the last known value before it in its row; NaN if there is none."""
+    columns = np.where(known, np.arange(values.shape[1]), -1)
+    columns = np.maximum.accumulate(columns, axis=1)
+    found = np.take_along_axis(values, np.maximum(columns, 0), axis=1)
+    return np.where(columns >= 0, found, np.nan).astype(np.float32)
