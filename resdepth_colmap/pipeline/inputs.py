@@ -60,6 +60,8 @@ class ViewTensors(NamedTuple):
         sources: Second views, best first; may be empty.
         carried: What the depth maps of other views say, shape (B, 1, H, W), in 1/unit;
             0 = nothing. None = there are no such maps.
+        confirmed: Where one of these says the same as the initial depth, shape (B, 1,
+            H, W), bool; likewise.
     """
 
     inverse_depth: Tensor
@@ -68,6 +70,7 @@ class ViewTensors(NamedTuple):
     K: Tensor
     sources: tuple[SourceTensors, ...]
     carried: Tensor | None = None
+    confirmed: Tensor | None = None
 
 
 class InputStack(NamedTuple):

@@ -2,7 +2,6 @@
 
 import contextlib
 import dataclasses
-import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -25,10 +24,10 @@ from resdepth_colmap.pipeline.inputs import (
     photo_consistency,
     warp_sources,
 )
+from resdepth_colmap.pipeline.kept_depth import FILTERED_SHARE, undone_change
 from resdepth_colmap.pipeline.source_maps import (
     SourceMap,
-    carried_inverse_depth,
-    confirmed_by,
+    carried_depth,
     goes_along_rows,
 )
 from resdepth_colmap.pipeline.tiling import Window, apply_tiled, pad_to_multiple
@@ -45,17 +44,8 @@ CONFIDENT_ERROR = 0.01
 LOG_SCALE_LIMIT = 12.0
 
 
-KEPT_CONSISTENCY = 0.15
-"""Photo-consistency (NCC of 0.7) up to which the photographs confirm a depth."""
-
-FILTERED_SHARE = 0.95
-"""A map with less of its pixels filled has been filtered."""
-
 LEAST_CONFIRMED_SHARE = 0.05
 """Other views' maps that confirm less of a map are of no use."""
-
-KEPT_CHANGE = 0.05
-"""Relative change that is no correction of an outlier: a confirmed depth stays."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
@@ -125,8 +115,9 @@ def refine_view(
 
     Each pass warps the sources anew with the depth of the pass before. The mask of real
     pixels stays that of the first: it tells the network what was measured. A measured
-    depth that the photographs confirm is kept where the network would change it by less
-    than 5 %: matching is more exact there than the network (docs/adr/0006).
+    depth that a map of another view confirms is kept, and one that the photographs
+    confirm where the network would change it by less than 5 %: matching is more exact
+    there than the network (docs/adr/0006 and 0012).
 
     Args:
         view: Initial depth, images and poses; sources that the network does not take
@@ -146,14 +137,14 @@ def refine_view(
         measured = tensors.inverse_depth[tensors.valid]
         low = float(measured.min()) * LEAST_INVERSE_RATIO
         high = float(measured.max()) * LARGEST_INVERSE_RATIO
-        confirmed = _confirmed(tensors, config)
+        undone = undone_change(tensors) if config.keep_confirmed else 0.0
         initial = tensors.inverse_depth
         for _ in range(config.passes):
             stack = build_inputs(tensors, network.config)
             outputs = _run_tiled(stack, network, config).to(device)[None]
             refined = (tensors.inverse_depth + outputs[:, :1]).clamp(low, high)
-            little = (refined - initial).abs() < KEPT_CHANGE * initial
-            refined = torch.where(confirmed & little, initial, refined)
+            is_undone = (refined - initial).abs() < undone * initial
+            refined = torch.where(is_undone, initial, refined)
             tensors = tensors._replace(inverse_depth=refined)
         if network.config.confidence:
             error = outputs[:, 1:2]
@@ -228,22 +219,20 @@ def view_tensors(view: ViewInputs, device: torch.device, use_maps: bool) -> View
     Raises:
         ValueError: If the initial depth map has no valid pixel.
     """
-    inverse_depth, valid = initial_maps(view.depth)
-    carried = None
+    filled, valid = initial_maps(view.depth)
+    carried, confirmed = None, None
     if use_maps and view.source_maps:
-        carried = carried_inverse_depth(inverse_depth, view.K, view.source_maps)
-        is_known = valid & confirmed_by(inverse_depth, carried)
-        if is_known.sum() < LEAST_CONFIRMED_SHARE * valid.sum():
-            carried = None  # maps of other scenes, or of failed pairs
-        elif not _is_filtered(valid):
+        carried, confirms = carried_depth(filled, view.K, view.source_maps)
+        confirmed = valid & confirms
+        if confirmed.sum() < LEAST_CONFIRMED_SHARE * valid.sum():
+            carried, confirmed = None, None  # maps of another scene, or of failed pairs
+        elif valid.mean() >= FILTERED_SHARE:
             along_rows = goes_along_rows(view.source_maps[0], view.K, valid.shape)
-            inverse_depth = complete_from_background(
-                inverse_depth, is_known, along_rows
-            )
-            valid = is_known
+            filled = complete_from_background(filled, confirmed, along_rows)
+            valid = confirmed
     return ViewTensors(
-        inverse_depth=_image(inverse_depth, device),
-        valid=torch.from_numpy(valid)[None, None].to(device),
+        inverse_depth=_image(filled, device),
+        valid=_mask(valid, device),
         gray=_image(view.gray, device),
         K=torch.from_numpy(view.K)[None],
         sources=tuple(
@@ -255,6 +244,7 @@ def view_tensors(view: ViewInputs, device: torch.device, use_maps: bool) -> View
             for source in view.sources
         ),
         carried=None if carried is None else _image(carried, device),
+        confirmed=None if confirmed is None else _mask(confirmed, device),
     )
 
 
@@ -262,26 +252,8 @@ def _image(gray: GrayImage, device: torch.device) -> Tensor:
     return torch.from_numpy(np.array(gray, dtype=np.float32))[None, None].to(device)
 
 
-def _confirmed(tensors: ViewTensors, config: RefineConfig) -> Tensor:
-    """Where the initial depth is real and its filter or a source vouches for it.
-
-    Shape (B, 1, H, W), bool. A map with holes was filtered: what its filter left was
-    consistent over several views, which says more than one second view can. Where there
-    are maps of other views, what none of them confirms is not valid any more.
-    """
-    if not config.keep_confirmed:
-        return torch.zeros_like(tensors.valid)
-    if tensors.carried is not None or _is_filtered(tensors.valid):
-        return tensors.valid
-    if not tensors.sources:
-        return torch.zeros_like(tensors.valid)
-    warped = warp_sources(tensors, 1)
-    is_good = photo_consistency(tensors.gray, warped) < KEPT_CONSISTENCY
-    return is_good & tensors.valid
-
-
-def _is_filtered(valid: NDArray[np.bool_] | Tensor) -> bool:
-    return float(valid.sum()) < FILTERED_SHARE * math.prod(valid.shape)
+def _mask(flags: NDArray[np.bool_], device: torch.device) -> Tensor:
+    return torch.from_numpy(flags)[None, None].to(device)
 
 
 def _correlation(tensors: ViewTensors, num_sources: int) -> Tensor:

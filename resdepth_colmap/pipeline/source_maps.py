@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -15,7 +16,10 @@ NUM_SOURCE_MAPS = 4
 """Other views whose maps are looked at."""
 
 CONFIRMING_CHANGE = 0.02
-"""Relative difference up to which another view's map confirms a depth."""
+CONFIRMING_PX = 1.0
+"""Another view's map confirms a depth that is off by less than that relatively, or by
+less than that in its image: with a short baseline, two percent are less than anyone can
+match (COLMAP's geometric consistency allows 1 px there and back)."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
@@ -33,21 +37,32 @@ class SourceMap:
     source_from_reference: Matrix
 
 
-def carried_inverse_depth(
+class Carried(NamedTuple):
+    """What maps of other views say of a view.
+
+    Attributes:
+        inverse_depth: Of several the one nearest to what is there, shape (H, W),
+            float32, in 1/unit; 0 where no map says anything.
+        confirms: Where a map says the same as is there, shape (H, W).
+    """
+
+    inverse_depth: FloatMap
+    confirms: npt.NDArray[np.bool_]
+
+
+def carried_depth(
     inverse_depth: FloatMap, K: Matrix, maps: Sequence[SourceMap]
-) -> FloatMap:
-    """What the maps say of each pixel; of several the one nearest to what is there.
+) -> Carried:
+    """Carry the maps of other views into a view and compare.
 
     Args:
         inverse_depth: Of the reference, shape (H, W), float32, in 1/unit, > 0.
         K: K of the reference for index coordinates, shape (3, 3), in pixels.
         maps: Those of other views.
-
-    Returns:
-        Inverse depth, shape (H, W), float32, in 1/unit; 0 where no map says anything.
     """
     height_px, width_px = inverse_depth.shape
     best = np.zeros_like(inverse_depth)
+    confirms = np.zeros(inverse_depth.shape, bool)
     for source in maps:
         arrived = carry_inverse_depth(
             torch.from_numpy(invert_map(source.depth))[None, None],
@@ -56,15 +71,18 @@ def carried_inverse_depth(
             torch.from_numpy(source.source_from_reference)[None],
             (height_px, width_px),
         )[0, 0].numpy()
-        is_nearer = np.abs(arrived - inverse_depth) < np.abs(best - inverse_depth)
-        best = np.where((arrived > 0) & (is_nearer | (best == 0)), arrived, best)
-    return best
+        is_there, change = arrived > 0, np.abs(arrived - inverse_depth)
+        is_nearer = (best == 0) | (change < np.abs(best - inverse_depth))
+        best = np.where(is_there & is_nearer, arrived, best)
+        limit = np.maximum(CONFIRMING_CHANGE * inverse_depth, _of_pixels(source))
+        confirms |= is_there & (change < limit)
+    return Carried(best, confirms)
 
 
-def confirmed_by(inverse_depth: FloatMap, carried: FloatMap) -> npt.NDArray[np.bool_]:
-    """Where another view's map says the same, shape (H, W)."""
-    change = np.abs(carried - inverse_depth)
-    return np.asarray((carried > 0) & (change < CONFIRMING_CHANGE * inverse_depth))
+def _of_pixels(source: SourceMap) -> float:
+    """The change of inverse depth, in 1/unit, that moves a point `CONFIRMING_PX`."""
+    baseline = float(np.linalg.norm(source.source_from_reference[:, 3]))
+    return CONFIRMING_PX / max(baseline * float(source.K[0, 0]), 1e-12)
 
 
 def goes_along_rows(source: SourceMap, K: Matrix, size_px: tuple[int, int]) -> bool:

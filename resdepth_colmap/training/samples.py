@@ -25,6 +25,7 @@ from resdepth_colmap.network.network_config import (
     NetworkConfig,
 )
 from resdepth_colmap.pipeline.inputs import build_inputs
+from resdepth_colmap.pipeline.kept_depth import FILTERED_SHARE
 from resdepth_colmap.pipeline.progress import Progress, SilentProgress
 from resdepth_colmap.pipeline.refine import view_tensors
 from resdepth_colmap.scene import DepthMap
@@ -32,9 +33,6 @@ from resdepth_colmap.training.labelled_views import LabelledView, Loaded, labell
 
 HOLES_CONSISTENCY = 0.25
 """Photo-consistency above which the copy "with holes" of a map has none."""
-
-FILTERED_SHARE = 0.95
-"""A map with less of its pixels filled has holes of its own."""
 
 DENSE, COMPLETED, HOLES = "-dense", "-completed", "-holes"
 """How the names of samples end: of a map without holes, of one that the maps of other

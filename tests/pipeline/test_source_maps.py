@@ -13,13 +13,14 @@ from analytic_scene import (
     two_views,
     view_at,
 )
+from hypothesis import assume, given
+from hypothesis import strategies as st
 
 from resdepth_colmap.geometry.inverse_depth import invert_map
 from resdepth_colmap.geometry.pixels import index_K
 from resdepth_colmap.pipeline.source_maps import (
     SourceMap,
-    carried_inverse_depth,
-    confirmed_by,
+    carried_depth,
     goes_along_rows,
 )
 from resdepth_colmap.scene import FloatMap, View, cam_from_cam
@@ -47,30 +48,53 @@ def map_of(source: View, factor: float = 1.0) -> SourceMap:
 def test_a_right_map_confirms_a_right_depth_and_not_a_wrong_one() -> None:
     reference, source = two_views()
     right = inverse_seen_by(reference)
-    carried = carried_inverse_depth(right, K, [map_of(source)])
+    carried, confirms = carried_depth(right, K, [map_of(source)])
     arrived = carried > 0
     assert arrived.mean() > 0.6
-    assert confirmed_by(right, carried)[arrived].mean() > 0.95
-    wrong: FloatMap = (1.05 * right).astype(np.float32)
-    carried = carried_inverse_depth(wrong, K, [map_of(source)])
-    assert not confirmed_by(wrong, carried).any()
+    assert confirms[arrived].mean() > 0.95
+    np.testing.assert_allclose(carried[arrived], right[arrived], rtol=0.02)
+    for factor in (0.8, 1.2):  # more than a pixel
+        wrong: FloatMap = (factor * right).astype(np.float32)
+        assert not carried_depth(wrong, K, [map_of(source)]).confirms.any()
 
 
 def test_of_several_maps_the_one_that_confirms_counts() -> None:
     reference, source = two_views()
     right = inverse_seen_by(reference)
     maps = [map_of(source, factor) for factor in (0.8, 1.0, 1.3)]
+    alone = carried_depth(right, K, [maps[1]])
     for order in (maps, maps[::-1]):
-        carried = carried_inverse_depth(right, K, order)
-        alone = carried_inverse_depth(right, K, [maps[1]])
-        confirmed = confirmed_by(right, alone)
-        assert confirmed_by(right, carried)[confirmed].all()
+        together = carried_depth(right, K, order)
+        assert together.confirms[alone.confirms].all()
+        change = np.abs(together.inverse_depth - right)
+        assert (change <= np.abs(alone.inverse_depth - right))[alone.confirms].all()
 
 
 def test_without_maps_nothing_is_said() -> None:
     right = inverse_seen_by(two_views()[0])
-    assert not carried_inverse_depth(right, K, []).any()
-    assert not confirmed_by(right, np.zeros_like(right)).any()
+    carried, confirms = carried_depth(right, K, [])
+    assert not carried.any()
+    assert not confirms.any()
+
+
+@given(st.floats(0.002, 0.1), st.floats(-0.2, 0.2))
+def test_a_pixel_of_the_other_image_is_allowed_however_short_the_baseline(
+    baseline: float, change: float
+) -> None:
+    reference = two_views()[0]
+    source = view_at((baseline, 0.0, 0.0), CAMERA)
+    wall = np.full(SIZE_PX, 4.0, np.float32)
+    other = dataclasses.replace(
+        map_of(source),
+        depth=wall,
+        source_from_reference=cam_from_cam(source, reference),
+    )
+    found = invert_map((wall / (1 + change)).astype(np.float32))
+    moved_px = abs(change) / 4.0 * baseline * CAMERA.fx
+    assume(abs(moved_px - 1.0) > 0.01 and abs(abs(change) / (1 + change) - 0.02) > 1e-4)
+    confirms = carried_depth(found, K, [other]).confirms
+    expected = moved_px < 1.0 or abs(change) / (1 + change) < 0.02
+    assert confirms[:, 8:-8].all() == expected
 
 
 @pytest.mark.parametrize(
@@ -92,6 +116,5 @@ def test_a_map_of_another_size_says_the_same() -> None:
         camera=source.camera.resized(CAMERA.width_px // 2, CAMERA.height_px // 2),
     )
     right = inverse_seen_by(reference)
-    carried = carried_inverse_depth(right, K, [map_of(half)])
-    confirmed = confirmed_by(right, carried)
-    assert confirmed[carried > 0].mean() > 0.95
+    carried, confirms = carried_depth(right, K, [map_of(half)])
+    assert confirms[carried > 0].mean() > 0.95
