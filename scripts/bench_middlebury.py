@@ -1,28 +1,45 @@
 """Measure matcher and network on the two-view scenes of Middlebury.
 
     python scripts/bench_middlebury.py [OPTIONS OF `resdepth-colmap evaluate depth`]
+    python scripts/bench_middlebury.py --without-network
 
 It is that command on the folder middlebury/ of RESDEPTH_DATA, and writes the figures to
 docs/measurements/middlebury.json unless --output names another file; then
-`python scripts/make_tables.py` puts them into the documents.
+`python scripts/make_tables.py` puts them into the documents. The second form takes a
+network that changes nothing, so that what remains is what the map of the second view
+does to the first one's; its figures go to middlebury_completed.json.
 """
 
 import os
 import sys
+import tempfile
 from pathlib import Path
 
 from resdepth_colmap.cli.main import main
+from resdepth_colmap.network.network_config import NetworkConfig
+from resdepth_colmap.network.unet import ResDepthNet
+from resdepth_colmap.network.weights import save_weights
 
 REPOSITORY = Path(__file__).resolve().parents[1]
-RESULT = REPOSITORY / "docs" / "measurements" / "middlebury.json"
+MEASUREMENTS = REPOSITORY / "docs" / "measurements"
+WITHOUT_NETWORK = "--without-network"
 
 
 def run() -> None:
     """Run the command; the last --output wins."""
     default = REPOSITORY.parent / "shared" / "data"
     scenes = Path(os.environ.get("RESDEPTH_DATA", default)) / "middlebury"
-    command = ["evaluate", "depth", str(scenes), "--output", str(RESULT)]
-    main([*command, *sys.argv[1:]], prog_name="resdepth-colmap")
+    options = [option for option in sys.argv[1:] if option != WITHOUT_NETWORK]
+    name = "middlebury"
+    with tempfile.TemporaryDirectory() as folder:
+        if len(options) < len(sys.argv) - 1:
+            name = "middlebury_completed"
+            weights = Path(folder) / "unchanging.safetensors"
+            save_weights(weights, ResDepthNet(NetworkConfig(base_channels=1)))
+            options = ["--weights", str(weights), *options]
+        command = ["evaluate", "depth", str(scenes)]
+        command += ["--output", str(MEASUREMENTS / f"{name}.json"), *options]
+        main(command, prog_name="resdepth-colmap")
 
 
 if __name__ == "__main__":

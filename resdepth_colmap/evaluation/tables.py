@@ -125,6 +125,8 @@ DOCUMENTS: dict[str, dict[str, Renderer]] = {
     "README.md": {"middlebury": middlebury_summary},
     "docs/benchmarks.md": {
         "middlebury": middlebury_table,
+        "middlebury_completed": middlebury_summary,
+        "held_out": middlebury_summary,
         "workspaces": workspaces_table,
         "refine": refine_table,
         "variants": variants_table,
