@@ -10,14 +10,11 @@ docs/measurements/held_out.json unless --output names another file; then
 """
 
 import argparse
-import os
-import shutil
+import subprocess
+import sys
 from pathlib import Path
 
-from make_training_data import make_room
-
 from resdepth_colmap.cli.main import main
-from resdepth_colmap.errors import WorkspaceError
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 RESULT = REPOSITORY / "docs" / "measurements" / "held_out.json"
@@ -30,19 +27,12 @@ def run() -> None:
     parser = argparse.ArgumentParser(description=__doc__, add_help=False)
     parser.add_argument("--rooms", type=Path, default=REPOSITORY / "build" / "held_out")
     arguments, options = parser.parse_known_args()
-    for seed in range(FIRST_SEED, FIRST_SEED + NUM_ROOMS):
-        room = arguments.rooms / f"room_{seed:06}"
-        if (room / "stereo" / "resdepth-stereo.json").is_file():
-            continue
-        try:
-            print(make_room(arguments.rooms, seed), flush=True)
-        except WorkspaceError as error:  # its views see nothing in common
-            print(f"{room.name} is left out: {error}", flush=True)
-            shutil.rmtree(room)
+    maker = [sys.executable, str(REPOSITORY / "scripts" / "make_training_data.py")]
+    seeds = ["--first-seed", str(FIRST_SEED), "--num-scenes", str(NUM_ROOMS)]
+    subprocess.run([*maker, str(arguments.rooms), *seeds], check=True)
     command = ["evaluate", "depth", str(arguments.rooms), "--output", str(RESULT)]
     main([*command, *options], prog_name="resdepth-colmap")
 
 
 if __name__ == "__main__":
-    os.environ.setdefault("NUMBA_NUM_THREADS", "1")
     run()

@@ -9,6 +9,7 @@ source and from several. Goes on where it stopped.
 import argparse
 import multiprocessing
 import os
+import shutil
 from functools import partial
 from pathlib import Path
 
@@ -18,6 +19,7 @@ VIEW_COUNTS = (2, 2, 2, 3, 2, 2, 4)
 def make_room(output: Path, seed: int) -> str:
     """Render one room, and match all of its views."""
     from resdepth_colmap.config import StereoBackend, StereoConfig, SynthesisConfig
+    from resdepth_colmap.errors import WorkspaceError
     from resdepth_colmap.io.model import read_scene
     from resdepth_colmap.io.workspace import open_workspace
     from resdepth_colmap.pipeline.stereo import stereo_workspace
@@ -32,9 +34,13 @@ def make_room(output: Path, seed: int) -> str:
     (path,) = synthesize(output, config)
     workspace = open_workspace(path)
     scene = read_scene(workspace.sparse_path, workspace.images_path, workspace.path)
-    report = stereo_workspace(
-        workspace, scene, StereoConfig(seed=seed, filter=False), StereoBackend.CPU
-    )
+    try:
+        report = stereo_workspace(
+            workspace, scene, StereoConfig(seed=seed, filter=False), StereoBackend.CPU
+        )
+    except WorkspaceError as error:  # its views have nothing in common
+        shutil.rmtree(path)
+        return f"{path.name} is left out: {error}"
     return f"{path.name}: {len(report.matched)} matched, {len(report.kept)} kept"
 
 
