@@ -25,6 +25,7 @@ from resdepth_colmap.io.patch_match_cfg import SourceKind, read_sources
 from resdepth_colmap.io.workspace import Workspace, check_images, open_workspace
 from resdepth_colmap.matching.patch_match import MatchView
 from resdepth_colmap.pipeline.initial_map import candidate_kinds, choose_initial_map
+from resdepth_colmap.pipeline.source_maps import NUM_SOURCE_MAPS
 from resdepth_colmap.pipeline.view_images import ViewImages
 from resdepth_colmap.scene import DepthMap, Scene, View
 
@@ -88,7 +89,7 @@ def _case(
     initial = _initial(workspace, view)
     num_sources = options.stereo.max_num_sources
     if initial is not None:
-        num_sources = options.num_sources
+        num_sources = max(options.num_sources, NUM_SOURCE_MAPS)
     listed = _listed(workspace, scene, view.name)
     choices = choose_sources(scene, index, num_sources, listed)
     if not choices:

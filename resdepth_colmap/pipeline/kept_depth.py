@@ -1,7 +1,5 @@
 """Depth that a network must not change: what was right stays (docs/adr/0006, 0012)."""
 
-import math
-
 import torch
 from torch import Tensor
 
@@ -13,17 +11,19 @@ KEPT_CONSISTENCY = 0.15
 FILTERED_SHARE = 0.95
 """A map with less of its pixels filled has been filtered."""
 
-KEPT_CHANGE = 0.05
-"""Relative change that is no correction of an outlier: a confirmed depth stays."""
+KEPT_CHANGE, KEPT_CONFIRMED_CHANGE = 0.05, 0.2
+"""Relative changes that are no correction of an outlier: a depth stays that a filter or
+the photographs confirm, and one that a map of another view does."""
 
 
 def undone_change(tensors: ViewTensors) -> Tensor:
     """The relative change below which the initial depth is put back.
 
-    Infinite where the depth map of another view says the same: two views that were
-    matched by themselves agree by chance only rarely. `KEPT_CHANGE` where a filter has
-    left the depth, which it has seen in several views, or where the photographs confirm
-    it; a larger change is the correction of an outlier. 0 for what was not measured.
+    A larger change is the correction of an outlier. `KEPT_CONFIRMED_CHANGE` where the
+    depth map of another view says the same: views that were matched by themselves agree
+    by chance only rarely. `KEPT_CHANGE` where a filter has left the depth, which it has
+    seen in several views, or where the photographs confirm it. 0 for what was not
+    measured.
 
     Args:
         tensors: A view with its initial depth.
@@ -42,7 +42,7 @@ def undone_change(tensors: ViewTensors) -> Tensor:
         is_kept = torch.zeros_like(valid)
     change = torch.where(is_kept, KEPT_CHANGE, 0.0)
     if tensors.confirmed is not None:
-        change = torch.where(tensors.confirmed, math.inf, change)
+        change = torch.where(tensors.confirmed, KEPT_CONFIRMED_CHANGE, change)
     return change
 
 

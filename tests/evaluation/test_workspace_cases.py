@@ -20,6 +20,7 @@ from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.evaluation.depth_case import CaseOptions, DepthCase
 from resdepth_colmap.evaluation.workspace_cases import read_workspace_cases
 from resdepth_colmap.io.depth_map import write_depth_map
+from resdepth_colmap.pipeline.source_maps import NUM_SOURCE_MAPS
 
 OPTIONS = CaseOptions(stereo=StereoConfig(max_num_sources=3), num_sources=1)
 
@@ -57,13 +58,18 @@ def truth_of(folder: Path, name: str, shape: tuple[int, int] = (60, 80)) -> None
     write_depth_map(folder / f"ground_truth/{name}.bin", np.ones(shape, np.float32))
 
 
-def test_a_view_is_matched_against_all_and_refined_by_the_best(tmp_path: Path) -> None:
+def test_a_view_is_matched_against_all_and_compared_with_the_best(
+    tmp_path: Path,
+) -> None:
     without = plane_folder(tmp_path / "without", kinds=())
     with_maps = plane_folder(tmp_path / "with", kinds=("geometric",))
     for folder in (without, with_maps):
         truth_of(folder, NAMES[2])
     assert len(read_case(without).sources) == 3
-    assert len(read_case(with_maps).sources) == 1
+    case = read_case(with_maps)
+    assert len(case.sources) == NUM_SOURCE_MAPS
+    assert case.initial is not None
+    assert [it is not None for it in case.initial.source_depths] == [True] * 4
 
 
 def test_the_sources_that_patch_match_cfg_names_are_taken(tmp_path: Path) -> None:
