@@ -1,13 +1,16 @@
 """Measure how right the CPU PatchMatch is, and how fast.
 
     python scripts/bench_matching.py [--only PART ...] [--cache FOLDER] [--data FOLDER]
+        [--all-photos]
 
-Parts: meeting_room and plant against COLMAP's own maps, middlebury and rendered against
-the truth, speed on noise. Maps are made by the stage `stereo` with default options, in
-workspaces of their own in the cache; finished ones are not made again while the matcher
-finds the same (its METHOD). One thread matches; processor seconds are told, which other
-jobs change little. Each part goes to docs/measurements/matching.json when it is done;
-then `python scripts/make_tables.py` puts the figures into the documents.
+Parts: meeting_room and plant against COLMAP's own maps; more_sources: the worst images
+of meeting_room with 20 sources; disagreement: why maps of it differ; middlebury and
+rendered against the truth; speed on noise. Maps are made by the stage `stereo` with
+default options, in workspaces of their own in the cache; finished ones are not made
+again while the matcher finds the same (its METHOD). One thread matches; processor
+seconds are told, which other jobs change little. Each part goes to
+docs/measurements/matching.json when it is done; then `python scripts/make_tables.py`
+puts the figures into the documents.
 """
 
 import argparse
@@ -18,7 +21,8 @@ import os
 from pathlib import Path
 
 from resdepth_colmap.config import StereoConfig
-from resdepth_colmap.evaluation.matching_parts import PARTS, Folders, rounded
+from resdepth_colmap.evaluation.matching_parts import PARTS
+from resdepth_colmap.evaluation.matching_passes import Folders, rounded
 from resdepth_colmap.evaluation.matching_tables import matching_table
 from resdepth_colmap.matching.patch_match import METHOD
 from resdepth_colmap.pipeline.versions import versions
@@ -35,6 +39,11 @@ def main() -> None:
     parser.add_argument("--only", choices=PARTS, nargs="+", default=list(PARTS))
     parser.add_argument("--data", type=Path, default=DATA, help="the real data")
     parser.add_argument("--cache", type=Path, default=CACHE, help="maps are kept there")
+    parser.add_argument(
+        "--all-photos",
+        action="store_true",
+        help="match those of meeting_room without maps of COLMAP, too, as sources",
+    )
     parser.add_argument("--output", type=Path, default=RESULT)
     arguments = parser.parse_args()
     output: Path = arguments.output
@@ -44,7 +53,11 @@ def main() -> None:
     from resdepth_colmap.matching import sweeps  # noqa: F401 (the threading layer)
 
     numba.set_num_threads(1)
-    folders = Folders(data=arguments.data, cache=arguments.cache / f"method_{METHOD}")
+    folders = Folders(
+        data=arguments.data,
+        cache=arguments.cache / f"method_{METHOD}",
+        all_photos=arguments.all_photos,
+    )
     for name in arguments.only:
         measured = json.loads(output.read_text("utf-8")) if output.exists() else {}
         part = rounded(PARTS[name](folders))

@@ -4,26 +4,31 @@ Maps are made by the stage `stereo`, with default options, in workspaces of thei
 """
 
 import dataclasses
-import logging
 from collections.abc import Callable, Mapping
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from resdepth_colmap.config import FuseConfig, StereoConfig
 from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.evaluation.depth_metrics import depth_metrics
-from resdepth_colmap.evaluation.map_agreement import (
-    ViewMap,
-    mean_of,
-    num_confirming,
-    shares_within,
-)
+from resdepth_colmap.evaluation.map_agreement import mean_of, shares_within
 from resdepth_colmap.evaluation.matched_workspace import (
     MatchedWorkspace,
     copied_maps,
     matched_workspace,
+)
+from resdepth_colmap.evaluation.matching_disagreement import measure_disagreement
+from resdepth_colmap.evaluation.matching_meeting_room import measure_meeting_room
+from resdepth_colmap.evaluation.matching_more_sources import measure_more_sources
+from resdepth_colmap.evaluation.matching_passes import (
+    ALL,
+    KINDS,
+    LIMITS,
+    Folders,
+    Result,
+    compared,
+    depth_of,
+    match_both,
 )
 from resdepth_colmap.evaluation.matching_speed import measured_speed
 from resdepth_colmap.evaluation.true_cloud import read_depth_truth
@@ -31,132 +36,16 @@ from resdepth_colmap.evaluation.workspace_cases import SEEN_SUFFIX, TRUTH_FOLDER
 from resdepth_colmap.io.depth_map import read_depth_map
 from resdepth_colmap.io.images import read_gray
 from resdepth_colmap.io.patch_match_cfg import SourceKind, SourceSpec
-from resdepth_colmap.io.workspace import Workspace, open_workspace
+from resdepth_colmap.io.workspace import open_workspace
 from resdepth_colmap.pipeline.fuse_colmap import fuse_with_colmap
 from resdepth_colmap.pipeline.fuse_view import MapFiles
 from resdepth_colmap.pipeline.progress import SilentProgress
 from resdepth_colmap.scene import DepthMap
 
-logger = logging.getLogger(__name__)
-
-KINDS = ("photometric", "geometric")
-FIRST = StereoConfig(geom_consistency=False, filter=False)
-BOTH = StereoConfig(filter=False)
-AUTO = SourceSpec(kind=SourceKind.AUTO, num_auto=20)
-ALL = SourceSpec(kind=SourceKind.ALL)
-LIMITS = (0.01, 0.02, 0.05)
-CONFIRMED_WITHIN = 0.01
 FIRST_IMAGE, SECOND_IMAGE = "im0.png", "im1.png"
 
 # COLMAP's defaults.
 FUSION = FuseConfig(min_num_views=5, max_normal_error_deg=10.0)
-
-Result = dict[str, Any]
-Specs = Mapping[str, SourceSpec]
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class Folders:
-    """Where scenes are read from, and where maps are kept."""
-
-    data: Path
-    cache: Path
-
-
-def match_both(
-    matched: MatchedWorkspace,
-    sources: Specs,
-    second: Specs | None = None,
-    ranged: Mapping[str, Any] | None = None,
-) -> Result:
-    """Unfiltered maps of both passes; processor seconds a map of each.
-
-    Args:
-        matched: Where they go.
-        sources: The images of the first pass, and their sources.
-        second: Those of the second one, if they are fewer.
-        ranged: Options for the depth range.
-    """
-    seconds = {}
-    for kind, config, specs in (
-        ("photometric", FIRST, sources),
-        ("geometric", BOTH, second or sources),
-    ):
-        config = dataclasses.replace(config, **(ranged or {}))
-        seconds[kind] = rounded(matched.match(kind, specs, config))
-        logger.info("%s: %s %s s a map.", matched.path.name, kind, seconds[kind])
-    return seconds
-
-
-def rounded(value: Any) -> Any:
-    """The same with six digits behind the point, in all its parts."""
-    if isinstance(value, dict):
-        return {key: rounded(part) for key, part in value.items()}
-    return round(value, 6) if isinstance(value, float) else value
-
-
-def depth_of(workspace: Workspace, name: str, kind: str) -> DepthMap:
-    """A depth map."""
-    return read_depth_map(workspace.depth_map_path(name, kind))
-
-
-def measure_meeting_room(folders: Folders) -> Result:
-    """Where a neighbour's map confirms COLMAP's: how often ours says the same."""
-    colmap = open_workspace(folders.data / "meeting_room")
-    matched = matched_workspace(colmap.path, folders.cache / "meeting_room")
-    views = [v for v in matched.scene.views if colmap.map_kinds(v.name)]
-    seconds = match_both(matched, {view.name: AUTO for view in views})
-    theirs = {
-        view.name: ViewMap(view=view, depth=depth_of(colmap, view.name, KINDS[0]))
-        for view in views
-    }
-    maps: Result = {}
-    for name, oracle in theirs.items():
-        others = [other for other in theirs.values() if other is not oracle]
-        counts = num_confirming(oracle, others, CONFIRMED_WITHIN)
-        maps[name] = {
-            "pixels": float((counts > 0).mean()),
-            "chance": _confirmed_by_chance(oracle, others),
-        }
-        # A view of whose sources none was matched has no geometric map.
-        for kind in matched.workspace.map_kinds(name):
-            depth = depth_of(matched.workspace, name, kind)
-            maps[name][kind] = shares_within(depth, oracle.depth, counts > 0, LIMITS)
-            maps[name][f"{kind}_twice"] = shares_within(
-                depth, oracle.depth, counts > 1, LIMITS
-            )
-    result = compared(maps, seconds)
-    confirmed = sum(entry["pixels"] for entry in maps.values())
-    result["chance"] = sum(entry["chance"] for entry in maps.values()) / confirmed
-    result["mean_twice"] = {kind: _mean(maps, f"{kind}_twice") for kind in KINDS}
-    return result
-
-
-def _confirmed_by_chance(oracle: ViewMap, others: list[ViewMap]) -> float:
-    """Share of the pixels that others confirm when all depths are wrong by 5 %."""
-    counts = [
-        num_confirming(
-            ViewMap(view=oracle.view, depth=oracle.depth * np.float32(factor)),
-            *(others, CONFIRMED_WITHIN),
-        )
-        for factor in (0.95, 1.05)
-    ]
-    return float((np.stack(counts) > 0).mean())
-
-
-def _mean(maps: Result, key: str) -> Result:
-    """Over the maps of which this was measured."""
-    return mean_of([entry[key] for entry in maps.values() if key in entry])
-
-
-def compared(maps: Result, seconds: Result) -> Result:
-    """Of each map what was measured, and the means."""
-    means = {
-        kind: _mean(maps, kind)
-        for kind in KINDS
-        if any(kind in entry for entry in maps.values())
-    }
-    return {"maps": maps, "mean": means, "cpu_s_per_map": seconds}
 
 
 def measure_plant(folders: Folders) -> Result:
@@ -288,6 +177,8 @@ def fused_scores(filtered: MatchedWorkspace) -> Result:
 
 PARTS: dict[str, Callable[[Folders], Result]] = {
     "meeting_room": measure_meeting_room,
+    "more_sources": measure_more_sources,
+    "disagreement": measure_disagreement,
     "middlebury": measure_middlebury,
     "rendered": measure_rendered,
     "plant": measure_plant,

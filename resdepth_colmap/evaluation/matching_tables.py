@@ -11,6 +11,10 @@ from resdepth_colmap.evaluation.markdown import (
     number,
     percent,
 )
+from resdepth_colmap.evaluation.matching_disagreement_tables import (
+    disagreement_parts,
+    more_sources_parts,
+)
 
 Measured = Mapping[str, Any]
 
@@ -219,6 +223,8 @@ def _seconds_sentence(part: Measured) -> str:
 
 PARTS = {
     "meeting_room": _meeting_room,
+    "more_sources": more_sources_parts,
+    "disagreement": disagreement_parts,
     "middlebury": _middlebury,
     "rendered": _rendered,
     "plant": _plant,

@@ -15,11 +15,9 @@ from resdepth_colmap.evaluation.matched_workspace import (
     copied_maps,
     matched_workspace,
 )
-from resdepth_colmap.evaluation.matching_parts import (
-    Folders,
-    measure_meeting_room,
-    stretched_range,
-)
+from resdepth_colmap.evaluation.matching_meeting_room import measure_meeting_room
+from resdepth_colmap.evaluation.matching_parts import stretched_range
+from resdepth_colmap.evaluation.matching_passes import Folders
 from resdepth_colmap.io.depth_map import read_depth_map
 from resdepth_colmap.io.patch_match_cfg import SourceKind, SourceSpec
 
