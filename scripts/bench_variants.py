@@ -6,11 +6,14 @@
 The paper's part: unfiltered PatchMatch, its 5 x 5 median, Unet-stereo (images only),
 ResDepth-0, -mono, -stereo and -stereo_iter (paper, section "Network Variants"): the
 paper's networks, narrower, and its plain L1 loss, with a learning rate that fits the
-budget. The part beyond it begins with ResDepth-stereo and adds one thing after the
-other. Each view counts with the map that a refinement starts from; a scene without maps
-is matched in a copy. No rule is applied after a network. Scenes are held out as a
-whole. Goes on where it stopped. The figures go to docs/measurements/variants.json and
-beyond.json; then `python scripts/make_tables.py` puts them into the documents.
+budget; once with inverse depth over its spread, as the paper's ablation study divides
+heights by their standard deviation, and once with inverse depth times the baseline, as
+in its experiment on ETH3D. The part beyond the paper begins with the latter's
+ResDepth-stereo and adds one thing after the other. Each view counts with the map that a
+refinement starts from; a scene without maps is matched in a copy. No rule is applied
+after a network. Scenes are held out as a whole. Goes on where it stopped. Each part's
+figures go to docs/measurements/; then `python scripts/make_tables.py` puts them into
+the documents.
 """
 
 import argparse
@@ -18,17 +21,18 @@ import dataclasses
 import datetime
 import json
 import logging
-import shutil
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from resdepth_colmap.config import RefineConfig, StereoConfig
-from resdepth_colmap.evaluation.depth_metrics import depth_metrics, median_filtered
+from resdepth_colmap.evaluation.matched_workspace import linked_maps, matched_workspace
 from resdepth_colmap.evaluation.tables import HARDWARE
+from resdepth_colmap.evaluation.variant_errors import arm_errors, arm_summaries
 from resdepth_colmap.evaluation.variant_tables import beyond_table, variants_table
 from resdepth_colmap.io.depth_map import write_depth_map
+from resdepth_colmap.io.files import link_or_copy
 from resdepth_colmap.network.network_config import (
     InputVariant,
     NetworkConfig,
@@ -52,8 +56,6 @@ from resdepth_colmap.training.train_config import Preset, Schedule, TrainConfig
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 RESULTS = REPOSITORY / "docs" / "measurements"
-MEASURES = ("mae", "rmse", "medae", "bad_2")
-SHARED = ("images", "sparse", "ground_truth")
 STEREO, ITERATED = "resdepth_stereo", "resdepth_stereo_iter"
 REFINED_KIND = "refined"
 
@@ -75,6 +77,7 @@ PAPER = {
     STEREO: Options({"variant": InputVariant.STEREO}),
 }
 ADDITIONS = {
+    STEREO: PAPER[STEREO],
     "robust": Options({"normalisation": Normalisation.ROBUST}),
     "inputs": Options({"valid": True, "photo_consistency": True}),
     "last_block": Options({"last_block": True}),
@@ -85,6 +88,9 @@ ADDITIONS = {
     "holes": Options(training={"holes_share": TrainConfig.holes_share}),
 }
 """Beyond the paper; each row keeps what those before it have."""
+
+FOLDERS = {STEREO: f"{STEREO}-baseline", "robust": f"{STEREO}-robust"}
+"""Of networks that are among the paper's variants, too."""
 
 
 class Budget(NamedTuple):
@@ -113,26 +119,41 @@ class Trainer(NamedTuple):
 
 
 def lean_copies(scenes: Sequence[Path], folder: Path) -> list[Path]:
-    """Workspaces that share all with these, but have one map a view."""
-    return [_copied(scene, folder, _keep_initial_maps) for scene in scenes]
+    """Workspaces that share all with these, but have one map a view.
+
+    It is the map that a refinement starts from. A scene without maps is matched.
+    """
+    copies = []
+    for scene in scenes:
+        copy = matched_workspace(scene, folder / scene_name(scene))
+        linked_maps(scene, copy)
+        views = labelled_views(copy.path, StereoConfig(filter=False))
+        for view in views:
+            kinds = [other.kind for other in views if other.index == view.index]
+            camera = view.scene.views[view.index].camera
+            best = choose_initial_map(view.workspace, view.image_name, camera, kinds)
+            if view.kind != best.kind:
+                view.map_path.unlink()
+        copies.append(copy.path)
+    return copies
 
 
 def refined_copies(
     scenes: Sequence[Path], network: ResDepthNet, folder: Path
 ) -> list[Path]:
     """Workspaces that share all with these, but whose depth maps are refined."""
-
-    def refine_maps(scene: Path, copy: Path) -> None:
-        maps = copy / "stereo" / "depth_maps"
-        maps.mkdir(parents=True)
+    copies = []
+    for scene in scenes:
+        copy = matched_workspace(scene, folder / scene_name(scene))
         for view in labelled_views(scene):
-            loaded = view.load(network.config.num_sources)
+            path = copy.workspace.depth_map_path(view.image_name, REFINED_KIND)
+            loaded = None if path.exists() else view.load(network.config.num_sources)
             if loaded is not None:
-                depth = refined_by([network], loaded.inputs)
-                path = maps / f"{view.image_name}.{REFINED_KIND}.bin"
-                write_depth_map(path, depth)
-
-    return [_copied(scene, folder, refine_maps) for scene in scenes]
+                write_depth_map(path, refined_by([network], loaded.inputs))
+            elif not path.exists():  # of a failed pair: no training takes it
+                link_or_copy(view.map_path, path)
+        copies.append(copy.path)
+    return copies
 
 
 def refined_by(networks: Sequence[ResDepthNet], view: ViewInputs) -> DepthMap:
@@ -143,76 +164,22 @@ def refined_by(networks: Sequence[ResDepthNet], view: ViewInputs) -> DepthMap:
     return view.depth
 
 
-def _copied(scene: Path, folder: Path, fill: Callable[[Path, Path], None]) -> Path:
-    """A copy without stereo/ that is then filled; one that is there stays as it is."""
-    copy = folder / scene_name(scene)
-    if not copy.is_dir():
-        partial = folder / f".{copy.name}"
-        shutil.rmtree(partial, ignore_errors=True)
-        partial.mkdir(parents=True)
-        for part in SHARED:
-            (partial / part).symlink_to((scene / part).resolve())
-        fill(scene, partial)
-        partial.rename(copy)
-    return copy
-
-
-def _keep_initial_maps(scene: Path, copy: Path) -> None:
-    """Link the maps, or match; only what a refinement starts from stays."""
-    maps = copy / "stereo" / "depth_maps"
-    maps.mkdir(parents=True)
-    there = (scene / "stereo" / "depth_maps").resolve()
-    for path in there.rglob("*.bin"):
-        link = maps / path.relative_to(there)
-        link.parent.mkdir(parents=True, exist_ok=True)
-        link.symlink_to(path)
-    views = labelled_views(copy, StereoConfig(filter=False))
-    for view in views:
-        kinds = [other.kind for other in views if other.index == view.index]
-        camera = view.scene.views[view.index].camera
-        best = choose_initial_map(view.workspace, view.image_name, camera, kinds)
-        if view.kind != best.kind:
-            view.map_path.unlink()
-
-
 def measure(
     scenes: Sequence[Path], arms: Mapping[str, Sequence[ResDepthNet]]
 ) -> dict[str, Any]:
     """Errors of each arm on each view, and their means."""
-    errors: dict[str, dict[str, dict[str, float]]] = {}
+    errors = {}
     for view in (view for scene in scenes for view in labelled_views(scene)):
         loaded = view.load(num_sources=1)
         if loaded is None:
             continue
-        depth = loaded.inputs.depth
-        maps = {"unfiltered": depth, "median": median_filtered(depth)}
-        maps |= {name: refined_by(nets, loaded.inputs) for name, nets in arms.items()}
-        for name, values in maps.items():
-            metrics = depth_metrics(values, loaded.truth).to_mapping()
-            kept = {key: round(metrics[key] or 0.0, 6) for key in MEASURES}
-            errors.setdefault(name, {})[view.name] = kept
+        refined = {key: refined_by(nets, loaded.inputs) for key, nets in arms.items()}
+        errors[view.name] = arm_errors(loaded.inputs.depth, refined, loaded.truth)
     return {
         "num_scenes": len(scenes),
-        "num_views": len(next(iter(errors.values()), {})),
-        "arms": {name: _summary(errors[name], errors["unfiltered"]) for name in errors},
+        "num_views": len(errors),
+        "arms": arm_summaries(errors),
     }
-
-
-def _summary(
-    views: dict[str, dict[str, float]], initial: dict[str, dict[str, float]]
-) -> dict[str, Any]:
-    means = {key: _mean([view[key] for view in views.values()]) for key in MEASURES}
-    ratios = {
-        f"{key}_ratio": _mean(
-            [views[name][key] / initial[name][key] for name in views if initial[name]]
-        )
-        for key in ("mae", "medae")
-    }
-    return {**means, **ratios, "views": {n: v["mae"] for n, v in views.items()}}
-
-
-def _mean(values: list[float]) -> float:
-    return round(sum(values) / len(values), 6)
 
 
 Arms = dict[str, list[ResDepthNet]]
@@ -221,29 +188,32 @@ Arms = dict[str, list[ResDepthNet]]
 
 def paper_arms(trainer: Trainer) -> Arms:
     """The paper's variants."""
-    arms = {name: [trainer.network(name, PAPER[name])] for name in PAPER}
+    suffix = trainer.budget.network.normalisation
+    arms = {name: [trainer.network(f"{name}-{suffix}", PAPER[name])] for name in PAPER}
     (stereo,) = arms[STEREO]
-    copies = refined_copies(trainer.scenes, stereo, trainer.work / "refined_scenes")
-    again = trainer._replace(scenes=copies).network(ITERATED, PAPER[STEREO])
+    folder = trainer.work / f"refined_scenes-{suffix}"
+    trainer = trainer._replace(scenes=refined_copies(trainer.scenes, stereo, folder))
+    again = trainer.network(f"{ITERATED}-{suffix}", PAPER[STEREO])
     return {**arms, ITERATED: [stereo, again]}
 
 
 def beyond_arms(trainer: Trainer) -> Arms:
     """ResDepth-stereo, what is added to it, and what two passes add to that."""
-    arms = {STEREO: [trainer.network(STEREO, PAPER[STEREO])]}
-    options = PAPER[STEREO]
+    arms: Arms = {}
+    options = Options()
     for name, more in ADDITIONS.items():
         options = Options(
             {**options.network, **more.network}, {**options.training, **more.training}
         )
-        arms[name] = [trainer.network(name, options)]
+        arms[name] = [trainer.network(FOLDERS.get(name, name), options)]
     arms["two_passes"] = 2 * arms[name]
     return arms
 
 
 PARTS = {
-    "variants": (paper_arms, variants_table),
-    "beyond": (beyond_arms, beyond_table),
+    "variants": (paper_arms, variants_table, Normalisation.ROBUST),
+    "variants_baseline": (paper_arms, variants_table, Normalisation.BASELINE),
+    "beyond": (beyond_arms, beyond_table, Normalisation.BASELINE),
 }
 
 
@@ -300,11 +270,12 @@ def main() -> None:
         "rendered": split.held_out,
         "middlebury": lean_copies(watched, work / "watched"),
     }
-    trainer = Trainer(split.training, work, budget)
     arguments.output.mkdir(parents=True, exist_ok=True)
     for part in arguments.parts:
-        make_arms, table = PARTS[part]
-        arms = make_arms(trainer)
+        make_arms, table, normalisation = PARTS[part]
+        network = dataclasses.replace(budget.network, normalisation=normalisation)
+        budget = budget._replace(network=network)
+        arms = make_arms(Trainer(split.training, work, budget))
         measured = {
             "command": "python scripts/bench_variants.py",
             "date": datetime.datetime.now(datetime.UTC).date().isoformat(),

@@ -111,6 +111,26 @@ def matched_workspace(original: Path, path: Path) -> MatchedWorkspace:
     return MatchedWorkspace(path=path, workspace=workspace, scene=scene)
 
 
+def linked_maps(original: Path, copy: MatchedWorkspace) -> bool:
+    """Link the depth maps of a workspace in one of ours.
+
+    Args:
+        original: A dense workspace; nothing is written to it.
+        copy: What `matched_workspace` made of it.
+
+    Returns:
+        Whether there are any.
+    """
+    there = (open_workspace(original).stereo_path / "depth_maps").resolve()
+    maps = sorted(there.rglob("*.bin"))
+    for path in maps:
+        link = copy.workspace.stereo_path / "depth_maps" / path.relative_to(there)
+        link.parent.mkdir(parents=True, exist_ok=True)
+        if not link.exists():
+            link.symlink_to(path)
+    return bool(maps)
+
+
 def copied_maps(source: MatchedWorkspace, path: Path) -> MatchedWorkspace:
     """Another workspace of the same images that begins with the same maps."""
     if not (path / "stereo").is_dir():

@@ -15,6 +15,7 @@ from resdepth_colmap.evaluation.depth_case import CaseOptions
 from resdepth_colmap.evaluation.match_cache import MatchCache
 from resdepth_colmap.evaluation.matched_workspace import (
     MatchedWorkspace,
+    linked_maps,
     matched_workspace,
 )
 from resdepth_colmap.evaluation.workspace_cases import (
@@ -82,7 +83,7 @@ def scene_strips(
     progress = progress or SilentProgress()
     copy = matched_workspace(scene, output / "workspaces" / scene.name)
     _copy_config(scene, copy)
-    if not _link_maps(scene, copy) and not _has_maps(copy):
+    if not linked_maps(scene, copy) and not _has_maps(copy):
         _match(scene, copy, cache)
     report = refine_workspace(
         copy.workspace, config, scene=copy.scene, progress=progress
@@ -101,18 +102,6 @@ def _copy_config(scene: Path, copy: MatchedWorkspace) -> None:
     path = open_workspace(scene).stereo_path / CONFIG_NAME
     if path.is_file():
         shutil.copyfile(path, copy.workspace.stereo_path / CONFIG_NAME)
-
-
-def _link_maps(scene: Path, copy: MatchedWorkspace) -> bool:
-    """Link the maps of the scene; whether there are any."""
-    there = (open_workspace(scene).stereo_path / "depth_maps").resolve()
-    maps = sorted(there.rglob("*.bin"))
-    for path in maps:
-        link = copy.workspace.stereo_path / "depth_maps" / path.relative_to(there)
-        link.parent.mkdir(parents=True, exist_ok=True)
-        if not link.exists():
-            link.symlink_to(path)
-    return bool(maps)
 
 
 def _has_maps(copy: MatchedWorkspace) -> bool:

@@ -29,6 +29,11 @@ BEYOND = {
 }
 SETS = {"rendered": "held-out rendered scenes", "middlebury": "Middlebury"}
 
+NORMALISATIONS = {
+    "robust": "minus the tile's median, over half the tile's 10-90 % spread",
+    "baseline": "times the baseline, minus the tile's mean",
+}
+
 WORST_FIRST = (
     "unet_stereo",
     "resdepth_0",
@@ -41,7 +46,8 @@ WORST_FIRST = (
 
 def variants_table(measured: Mapping[str, Any]) -> str:
     """One row a variant and set: errors, and the means of their ratios."""
-    parts = [_measured_by(measured)]
+    kind = NORMALISATIONS[measured["network"]["normalisation"]]
+    parts = [f"{_measured_by(measured)} Its inverse depth: {kind}."]
     for name, label in SETS.items():
         if name in measured["sets"]:
             parts += _set_parts(label, measured["sets"][name])

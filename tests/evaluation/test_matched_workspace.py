@@ -13,6 +13,7 @@ from resdepth_colmap.evaluation.map_agreement import shares_within
 from resdepth_colmap.evaluation.matched_workspace import (
     MatchedWorkspace,
     copied_maps,
+    linked_maps,
     matched_workspace,
 )
 from resdepth_colmap.evaluation.matching_meeting_room import measure_meeting_room
@@ -93,6 +94,22 @@ def test_a_copy_begins_with_the_same_maps_and_leaves_them_alone(
     assert len(matcher.calls) == 2 * len(NAMES)  # no photometric pass again
     assert copy.workspace.depth_map_path(NAMES[0], "geometric").is_file()
     assert files(matched.path / "stereo" / "depth_maps") == before
+
+
+def test_maps_are_linked_whole_and_as_often_as_asked(
+    matched: MatchedWorkspace, tmp_path: Path
+) -> None:
+    scene = tmp_path / "scene"
+    before = files(scene)
+    for _ in range(2):
+        assert linked_maps(scene, matched)
+    for name in NAMES:
+        path = matched.workspace.depth_map_path(name, "photometric")
+        original = scene / "stereo" / "depth_maps" / f"{name}.photometric.bin"
+        assert path.resolve() == original.resolve()
+    assert files(scene) == before
+    write_plane_workspace(tmp_path / "empty", kinds=())
+    assert not linked_maps(tmp_path / "empty", matched)
 
 
 def test_agreement_is_counted_where_maps_of_colmap_confirm_each_other(

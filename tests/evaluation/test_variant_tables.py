@@ -34,7 +34,11 @@ def measured(**maes: float) -> dict[str, Any]:
         "steps": 3000,
         "num_scenes": 40,
         "training": {"batch_size": 4, "crop_px": 256, "learning_rate": 0.001},
-        "network": {"base_channels": 16, "max_channels": 128},
+        "network": {
+            "base_channels": 16,
+            "max_channels": 128,
+            "normalisation": "baseline",
+        },
         "sets": {"rendered": {"num_views": 7, "arms": arms}},
     }
 
@@ -46,7 +50,7 @@ def test_every_variant_has_a_row_in_the_papers_order() -> None:
     assert "| 0.100 | 0.500 | 12.3 | 25.0 % | 0.90 | 1.10 |" in lines[0]
     assert (
         "3,000 steps of 4 crops of 256 px from 40 rendered scenes, learning rate "
-        "0.001, 16 to 128 channels." in text
+        "0.001, 16 to 128 channels. Its inverse depth: times the baseline" in text
     )
 
 

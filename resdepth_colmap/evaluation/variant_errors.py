@@ -1,0 +1,68 @@
+"""Errors of several networks on the same views, and what they come to."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from resdepth_colmap.evaluation.depth_metrics import depth_metrics, median_filtered
+from resdepth_colmap.scene import DepthMap
+
+MEASURES = ("mae", "rmse", "medae", "bad_2")
+RATIOS = ("mae", "medae")
+INITIAL, MEDIAN = "unfiltered", "median"
+
+ArmErrors = dict[str, dict[str, float]]
+"""By arm, then by measure."""
+
+
+def arm_errors(
+    initial: DepthMap, refined: Mapping[str, DepthMap], truth: DepthMap
+) -> ArmErrors:
+    """Errors of one view: of the initial map, of its 5 x 5 median, of each network's.
+
+    Args:
+        initial: Shape (H, W), in units; 0 = no depth.
+        refined: By arm, same shape.
+        truth: Same shape; 0 = not known.
+    """
+    maps = {INITIAL: initial, MEDIAN: median_filtered(initial), **refined}
+    errors = {}
+    for name, depth in maps.items():
+        metrics = depth_metrics(depth, truth).to_mapping()
+        errors[name] = {key: round(metrics[key] or 0.0, 6) for key in MEASURES}
+    return errors
+
+
+def arm_summaries(views: Mapping[str, ArmErrors]) -> dict[str, dict[str, Any]]:
+    """Means over the views: of each error, and of its ratio to that of the initial map.
+
+    Args:
+        views: What `arm_errors` said of each view, by name. A view whose initial map
+            has no error of a kind does not count in that ratio.
+
+    Returns:
+        By arm: the means, the ratios `<measure>_ratio`, and each view's MAE.
+    """
+    arms = next(iter(views.values()), {})
+    return {arm: _summary(arm, views) for arm in arms}
+
+
+def _summary(arm: str, views: Mapping[str, ArmErrors]) -> dict[str, Any]:
+    means = {
+        key: _mean([errors[arm][key] for errors in views.values()]) for key in MEASURES
+    }
+    ratios = {
+        f"{key}_ratio": _mean(
+            [
+                errors[arm][key] / errors[INITIAL][key]
+                for errors in views.values()
+                if errors[INITIAL][key]
+            ]
+        )
+        for key in RATIOS
+    }
+    maes = {name: errors[arm]["mae"] for name, errors in views.items()}
+    return {**means, **ratios, "views": maes}
+
+
+def _mean(values: list[float]) -> float | None:
+    return round(sum(values) / len(values), 6) if values else None
