@@ -191,8 +191,9 @@ class RefineConfig(Config):
         input: Which maps to start from: auto (the fuller one), or a kind of map,
             that is the word before ".bin" in its file name.
         passes: How often to warp and refine (the paper's iter: 2).
-        keep_confirmed: Keep the initial depth of a pixel where another view's map
-            confirms it, or the photographs do and the network changes it only a little.
+        keep_confirmed: Keep the initial depth of a pixel where another view's map or
+            the photographs confirm it and the network changes it only a little, or by
+            less than the error that it expects to make.
         tile_px: Side of a square tile, in pixels.
         overlap_px: Overlap of neighbouring tiles, in pixels.
         device: Where the network runs.

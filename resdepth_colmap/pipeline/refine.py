@@ -116,8 +116,9 @@ def refine_view(
     Each pass warps the sources anew with the depth of the pass before. The mask of real
     pixels stays that of the first: it tells the network what was measured. A measured
     depth that a map of another view confirms is kept, and one that the photographs
-    confirm where the network would change it by less than 5 %: matching is more exact
-    there than the network (docs/adr/0006 and 0012).
+    confirm, where the network would change it only a little: matching is more exact
+    there than the network. Nor is a change taken that is smaller than the error that
+    the network itself expects (docs/adr/0006 and 0012).
 
     Args:
         view: Initial depth, images and poses; sources that the network does not take
@@ -137,14 +138,18 @@ def refine_view(
         measured = tensors.inverse_depth[tensors.valid]
         low = float(measured.min()) * LEAST_INVERSE_RATIO
         high = float(measured.max()) * LARGEST_INVERSE_RATIO
-        undone = undone_change(tensors) if config.keep_confirmed else 0.0
         initial = tensors.inverse_depth
+        undone = undone_change(tensors) * initial
         for _ in range(config.passes):
             stack = build_inputs(tensors, network.config)
             outputs = _run_tiled(stack, network, config).to(device)[None]
             refined = (tensors.inverse_depth + outputs[:, :1]).clamp(low, high)
-            is_undone = (refined - initial).abs() < undone * initial
-            refined = torch.where(is_undone, initial, refined)
+            if config.keep_confirmed:
+                limit = undone
+                if network.config.confidence:
+                    limit = torch.maximum(undone, outputs[:, 1:2])
+                is_undone = (refined - initial).abs() < limit
+                refined = torch.where(is_undone, initial, refined)
             tensors = tensors._replace(inverse_depth=refined)
         if network.config.confidence:
             error = outputs[:, 1:2]

@@ -62,12 +62,21 @@ def view(
 
 
 def network(seed: int | None = None, **options: object) -> ResDepthNet:
-    """Fresh without a seed; with one, its head does something."""
+    """Fresh without a seed; with one, its head does something, and is sure of it."""
     torch.manual_seed(seed or 0)
     net = ResDepthNet(NetworkConfig.from_mapping(SMALL | options))
     if seed is not None:
         torch.nn.init.normal_(net.head.weight, std=0.05)
+        expect_error(net, -12.0)
     return net
+
+
+def expect_error(net: ResDepthNet, log_scale: float) -> None:
+    """Let a network expect an error of about that logarithm everywhere."""
+    if net.config.confidence:
+        with torch.no_grad():
+            assert net.head.bias is not None
+            net.head.bias[-1] = log_scale
 
 
 def with_and_without_rule(initial: ViewInputs) -> tuple[DepthMap, DepthMap]:
@@ -157,7 +166,8 @@ def test_the_depth_stays_near_the_range_that_was_measured() -> None:
     net = network(seed=4)
     torch.nn.init.constant_(net.head.bias, 1e6)  # type: ignore[arg-type]
     initial = view()
-    refined = refine_view(initial, net, TILES)
+    without = dataclasses.replace(TILES, keep_confirmed=False)
+    refined = refine_view(initial, net, without)
     measured = initial.depth[initial.depth > 0]
     np.testing.assert_allclose(refined.depth, measured.min() / 4, rtol=1e-5)
 
@@ -256,7 +266,7 @@ def test_what_a_filter_left_stays_where_it_is_changed_a_little() -> None:
     little = measured & (np.abs(1 / without - 1 / safe) < 0.0499 / safe)
     assert little.any()
     np.testing.assert_allclose(with_rule[little], initial.depth[little], rtol=1e-6)
-    np.testing.assert_array_equal(with_rule[~measured], without[~measured])
+    np.testing.assert_allclose(with_rule[~measured], without[~measured], rtol=1e-5)
 
 
 def maps_of(factors: list[float]) -> tuple[SourceMap, ...]:
@@ -317,3 +327,16 @@ def test_a_filtered_map_is_not_completed_from_the_background() -> None:
     refined = refine_view(initial, network(), TILES).depth
     measured = initial.depth > 0
     np.testing.assert_allclose(refined[measured], initial.depth[measured], rtol=2e-7)
+
+
+def test_a_change_within_the_expected_error_is_not_made() -> None:
+    initial, net = view(), network(seed=1)
+    changed = refine_view(initial, net, TILES).depth
+    expect_error(net, 12.0)
+    unchanged = refine_view(initial, net, TILES).depth
+    measured = initial.depth > 0
+    np.testing.assert_allclose(unchanged[measured], initial.depth[measured], rtol=1e-6)
+    assert not np.isclose(changed, unchanged, rtol=1e-3).all()
+    without = dataclasses.replace(TILES, keep_confirmed=False)
+    free = refine_view(initial, net, without).depth
+    assert not np.isclose(free, unchanged, rtol=1e-3).all()
