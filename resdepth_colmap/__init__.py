@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from resdepth_colmap.pipeline.refine_workspace import refine_workspace
     from resdepth_colmap.pipeline.run import run_refine
     from resdepth_colmap.pipeline.run_config import RunConfig
+    from resdepth_colmap.pipeline.source_maps import SourceMap
     from resdepth_colmap.report.refine_and_report import refine_and_report
     from resdepth_colmap.scene import Camera, Scene, View
 
@@ -30,6 +31,7 @@ __all__ = [
     "ResDepthError",
     "RunConfig",
     "Scene",
+    "SourceMap",
     "SourceView",
     "StereoConfig",
     "View",
@@ -51,6 +53,7 @@ _MODULE_OF = {
     "ResDepthError": "errors",
     "RunConfig": "pipeline.run_config",
     "Scene": "scene",
+    "SourceMap": "pipeline.source_maps",
     "SourceView": "pipeline.refine",
     "StereoConfig": "config",
     "View": "scene",
