@@ -41,25 +41,31 @@ def carry_inverse_depth(
         of the source arrives.
     """
     height_px, width_px = size_px
-    batch = source_inverse_depth.shape[0]
     homogeneous = project_homogeneous(
         source_inverse_depth, source_K, reference_K, _inverse(source_from_reference)
     )
     depth_ratio = homogeneous[:, 2]
     usable = (source_inverse_depth[:, 0] > 0) & (depth_ratio > LEAST_DEPTH_RATIO)
     ratio = torch.where(usable, depth_ratio, 1.0)
-    inverse_depth = source_inverse_depth[:, 0] / ratio
-    x, y = (homogeneous[:, axis] / ratio for axis in (0, 1))
-    first = torch.arange(batch, device=x.device)[:, None, None] * height_px * width_px
-    carried = source_inverse_depth.new_zeros(batch * height_px * width_px)
-    for shift_x, shift_y in itertools.product((-REACH_PX, REACH_PX), repeat=2):
-        column, row = torch.round(x + shift_x), torch.round(y + shift_y)
-        inside = usable & (column >= 0) & (column < width_px)
-        inside &= (row >= 0) & (row < height_px)
-        pixels = row[inside].long() * width_px + column[inside].long()
-        pixels += first.expand_as(row)[inside]
-        carried.scatter_reduce_(0, pixels, inverse_depth[inside], reduce="amax")
-    return carried.reshape(batch, 1, height_px, width_px)
+    inverse_depth = (source_inverse_depth[:, 0] / ratio).flatten(1)
+    # A border of one pixel takes what falls outside.
+    columns, rows = (
+        [
+            torch.round(xy + shift).clamp(-1, size).int() + 1
+            for shift in (-REACH_PX, REACH_PX)
+        ]
+        for size, xy in zip(
+            (width_px, height_px),
+            torch.where(usable, homogeneous[:, :2].movedim(1, 0) / ratio, -2.0),
+            strict=True,
+        )
+    )
+    shape = (len(inverse_depth), 1, height_px + 2, width_px + 2)
+    carried = inverse_depth.new_zeros(shape).flatten(1)
+    for column, row in itertools.product(columns, rows):
+        pixels = (row * (width_px + 2) + column).flatten(1).long()
+        carried.scatter_reduce_(1, pixels, inverse_depth, reduce="amax")
+    return carried.reshape(shape)[..., 1:-1, 1:-1]
 
 
 def _inverse(pose: Tensor) -> Tensor:
