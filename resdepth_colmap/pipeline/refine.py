@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from resdepth_colmap.config import RefineConfig
-from resdepth_colmap.geometry.completion import complete_from_background
 from resdepth_colmap.geometry.inverse_depth import invert_map
 from resdepth_colmap.geometry.normals import normals_from_depth
 from resdepth_colmap.network.unet import ResDepthNet
@@ -19,17 +18,12 @@ from resdepth_colmap.pipeline.inputs import (
     SourceTensors,
     ViewTensors,
     build_inputs,
-    initial_maps,
     network_input,
     photo_consistency,
     warp_sources,
 )
-from resdepth_colmap.pipeline.kept_depth import FILTERED_SHARE, undone_change
-from resdepth_colmap.pipeline.source_maps import (
-    SourceMap,
-    carried_depth,
-    goes_along_rows,
-)
+from resdepth_colmap.pipeline.kept_depth import undone_change
+from resdepth_colmap.pipeline.source_maps import SourceMap, start_from
 from resdepth_colmap.pipeline.tiling import Window, apply_tiled, pad_to_multiple
 from resdepth_colmap.scene import DepthMap, FloatMap, GrayImage, Matrix, NormalMap
 
@@ -42,10 +36,6 @@ CONFIDENT_ERROR = 0.01
 """Relative error of the depth that the confidence is about."""
 
 LOG_SCALE_LIMIT = 12.0
-
-
-LEAST_CONFIRMED_SHARE = 0.05
-"""Other views' maps that confirm less of a map are of no use."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
@@ -218,26 +208,15 @@ def view_tensors(view: ViewInputs, device: torch.device, use_maps: bool) -> View
     Args:
         view: The view.
         device: Where to.
-        use_maps: Look at the maps of other views: what none of them confirms is
-            completed from the background, and no longer valid.
+        use_maps: Look at the maps of other views.
 
     Raises:
         ValueError: If the initial depth map has no valid pixel.
     """
-    filled, valid = initial_maps(view.depth)
-    carried, confirmed = None, None
-    if use_maps and view.source_maps:
-        carried, confirms = carried_depth(filled, view.K, view.source_maps)
-        confirmed = valid & confirms
-        if confirmed.sum() < LEAST_CONFIRMED_SHARE * valid.sum():
-            carried, confirmed = None, None  # maps of another scene, or of failed pairs
-        elif valid.mean() >= FILTERED_SHARE:
-            along_rows = goes_along_rows(view.source_maps[0], view.K, valid.shape)
-            filled = complete_from_background(filled, confirmed, along_rows)
-            valid = confirmed
+    start = start_from(view.depth, view.K, view.source_maps if use_maps else ())
     return ViewTensors(
-        inverse_depth=_image(filled, device),
-        valid=_mask(valid, device),
+        inverse_depth=_image(start.inverse_depth, device),
+        valid=_mask(start.valid, device),
         gray=_image(view.gray, device),
         K=torch.from_numpy(view.K)[None],
         sources=tuple(
@@ -248,8 +227,8 @@ def view_tensors(view: ViewInputs, device: torch.device, use_maps: bool) -> View
             )
             for source in view.sources
         ),
-        carried=None if carried is None else _image(carried, device),
-        confirmed=None if confirmed is None else _mask(confirmed, device),
+        carried=None if start.carried is None else _image(start.carried, device),
+        confirmed=None if start.confirmed is None else _mask(start.confirmed, device),
     )
 
 

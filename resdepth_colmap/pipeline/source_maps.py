@@ -8,8 +8,11 @@ import numpy as np
 import numpy.typing as npt
 import torch
 
+from resdepth_colmap.geometry.completion import complete_from_background
 from resdepth_colmap.geometry.forward_warp import carry_inverse_depth
 from resdepth_colmap.geometry.inverse_depth import invert_map
+from resdepth_colmap.pipeline.inputs import initial_maps
+from resdepth_colmap.pipeline.kept_depth import FILTERED_SHARE
 from resdepth_colmap.scene import DepthMap, FloatMap, Matrix
 
 NUM_SOURCE_MAPS = 4
@@ -20,6 +23,10 @@ CONFIRMING_PX = 1.0
 """Another view's map confirms a depth that is off by less than that relatively, or by
 less than that in its image: with a short baseline, two percent are less than anyone can
 match (COLMAP's geometric consistency allows 1 px there and back)."""
+
+
+LEAST_CONFIRMED_SHARE = 0.05
+"""Maps that confirm less of a map are of another scene, or of failed pairs."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
@@ -35,6 +42,54 @@ class SourceMap:
     depth: DepthMap
     K: Matrix
     source_from_reference: Matrix
+
+
+class Start(NamedTuple):
+    """What the refinement of a view starts from.
+
+    Attributes:
+        inverse_depth: Complete, shape (H, W), float32, in 1/unit.
+        valid: Where it was measured, and confirmed if other maps were asked, shape (H,
+            W).
+        carried: What the maps of other views say, shape (H, W), float32, in 1/unit; 0 =
+            nothing. None = there are no maps that are of any use.
+        confirmed: Where one of them says the same as was measured; likewise.
+    """
+
+    inverse_depth: FloatMap
+    valid: npt.NDArray[np.bool_]
+    carried: FloatMap | None = None
+    confirmed: npt.NDArray[np.bool_] | None = None
+
+
+def start_from(depth: DepthMap, K: Matrix, maps: Sequence[SourceMap]) -> Start:
+    """Complete a depth map, and compare it with those of other views.
+
+    In an unfiltered map only what another one confirms is taken for measured; the rest
+    is completed from the background. In a filtered one all that is there was confirmed
+    before; its holes take what other views measured there.
+
+    Args:
+        depth: Initial depth, shape (H, W), in units; 0 = hole.
+        K: K for index coordinates, shape (3, 3), in pixels.
+        maps: Those of other views, the first that of the best; may be empty.
+
+    Raises:
+        ValueError: If no pixel is valid.
+    """
+    filled, valid = initial_maps(depth)
+    if not maps:
+        return Start(filled, valid)
+    carried, confirms = carried_depth(filled, K, maps)
+    confirmed = valid & confirms
+    if confirmed.sum() < LEAST_CONFIRMED_SHARE * valid.sum():
+        return Start(filled, valid)
+    if valid.mean() < FILTERED_SHARE:
+        filled, _ = initial_maps(np.where(valid, depth, invert_map(carried)))
+        return Start(filled, valid, carried, confirmed)
+    along_rows = goes_along_rows(maps[0], K, depth.shape)
+    completed = complete_from_background(filled, confirmed, along_rows)
+    return Start(completed, confirmed, carried, confirmed)
 
 
 class Carried(NamedTuple):

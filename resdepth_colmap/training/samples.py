@@ -19,11 +19,7 @@ import torch
 from numpy.typing import NDArray
 
 from resdepth_colmap.io.files import write_whole
-from resdepth_colmap.network.network_config import (
-    CARRIED,
-    CARRIED_CHANGE,
-    NetworkConfig,
-)
+from resdepth_colmap.network.network_config import NetworkConfig
 from resdepth_colmap.pipeline.inputs import build_inputs
 from resdepth_colmap.pipeline.kept_depth import FILTERED_SHARE
 from resdepth_colmap.pipeline.progress import Progress, SilentProgress
@@ -38,7 +34,7 @@ DENSE, COMPLETED, HOLES = "-dense", "-completed", "-holes"
 """How the names of samples end: of a map without holes, of one that the maps of other
 views have been compared with, and of a map with holes."""
 
-_FORMAT = 4
+_FORMAT = 5
 
 
 class Sample(NamedTuple):
@@ -154,9 +150,9 @@ def _samples(loaded: Loaded, num_sources: int) -> Iterator[tuple[str, Sample]]:
         yield COMPLETED, build_sample(loaded, num_sources)
     depth = _with_holes(loaded.inputs.depth, dense, num_sources)
     if depth is not None:
-        inputs = dataclasses.replace(loaded.inputs, depth=depth)
-        sample = build_sample(loaded._replace(inputs=inputs), num_sources)
-        yield HOLES, _without_carried(sample, depth, num_sources)
+        # The maps of other views would have to be filtered like it.
+        inputs = dataclasses.replace(loaded.inputs, depth=depth, source_maps=())
+        yield HOLES, build_sample(loaded._replace(inputs=inputs), num_sources)
 
 
 def _fingerprint(view: LabelledView) -> str:
@@ -167,15 +163,6 @@ def _fingerprint(view: LabelledView) -> str:
     states = [(path.stat().st_size, path.stat().st_mtime_ns) for path in paths]
     key = json.dumps([_FORMAT, str(view.workspace.path.resolve()), states])
     return hashlib.sha256(key.encode()).hexdigest()[:10]
-
-
-def _without_carried(sample: Sample, depth: DepthMap, num_sources: int) -> Sample:
-    """The sample with the same holes in the source's map: a filter has no favourite."""
-    names = guidance_names(num_sources)
-    guidance = sample.guidance.copy()
-    for name in (CARRIED_CHANGE, CARRIED):
-        guidance[names.index(name)][depth == 0] = 0
-    return sample._replace(guidance=guidance)
 
 
 def _with_holes(depth: DepthMap, sample: Sample, num_sources: int) -> DepthMap | None:

@@ -22,6 +22,7 @@ from resdepth_colmap.pipeline.source_maps import (
     SourceMap,
     carried_depth,
     goes_along_rows,
+    start_from,
 )
 from resdepth_colmap.scene import FloatMap, View, cam_from_cam
 
@@ -118,3 +119,31 @@ def test_a_map_of_another_size_says_the_same() -> None:
     right = inverse_seen_by(reference)
     carried, confirms = carried_depth(right, K, [map_of(half)])
     assert confirms[carried > 0].mean() > 0.95
+
+
+def test_the_holes_of_a_filtered_map_take_what_other_views_measured() -> None:
+    reference, source = two_views()
+    depth = plane_seen_by(reference)
+    holes = np.zeros(SIZE_PX, bool)
+    holes[10:30, 24:40] = True
+    found = np.where(holes, 0, depth)
+    start = start_from(found, K, [map_of(source)])
+    seen = carried_depth(inverse_seen_by(reference), K, [map_of(source)]).confirms
+    error = np.abs(start.inverse_depth * depth - 1)
+    assert error[holes & seen].max() < 0.02
+    np.testing.assert_array_equal(start.valid, ~holes)
+    assert start.confirmed is not None
+    assert not start.confirmed[holes].any()
+    np.testing.assert_array_equal(
+        start.inverse_depth[~holes], invert_map(found)[~holes]
+    )
+
+
+def test_maps_of_another_scene_are_not_listened_to() -> None:
+    reference, source = two_views()
+    depth = plane_seen_by(reference)
+    alone = start_from(depth, K, [])
+    start = start_from(depth, K, [map_of(source, 3.0)])
+    assert start.carried is None and start.confirmed is None
+    np.testing.assert_array_equal(start.inverse_depth, alone.inverse_depth)
+    assert start.valid.all()
