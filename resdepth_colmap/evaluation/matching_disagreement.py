@@ -152,7 +152,7 @@ def groups_of(room: Room, image: Compared) -> Result:
     alike = likeness(image.theirs)
     steps, texture = near_steps(image.ours), textures(image.gray)
     num_sources = StereoConfig().max_num_sources
-    seen = sources_that_see(image, _sources(room, image, num_sources))
+    seen = sources_that_see(image, automatic_sources(room, image, num_sources))
     return {
         group: {
             "share": _share(where, image.counts > 0),
@@ -203,8 +203,8 @@ def costs_of(room: Room, image: Compared) -> Result:
     ]
     return costs_of_both(
         [
-            _match_view(room, v)
-            for v in (image.view, *_sources(room, image, MORE_SOURCES))
+            match_view_of(room, view)
+            for view in (image.view, *automatic_sources(room, image, MORE_SOURCES))
         ],
         pixels,
         image.ours[y, x].astype(np.float64),
@@ -245,8 +245,8 @@ def sources_that_see(image: Compared, sources: list[View]) -> npt.NDArray[np.int
     return found
 
 
-def _sources(room: Room, image: Compared, number: int) -> list[View]:
-    """The view's automatic sources, the best ones first."""
+def automatic_sources(room: Room, image: Compared, number: int) -> list[View]:
+    """The view's sources as they are chosen by default, the best ones first."""
     scene = room.matched.scene
     choices = choose_sources(scene, scene.index(image.view.name), len(scene.views))
     least_deg = StereoConfig().min_triangulation_angle
@@ -255,7 +255,8 @@ def _sources(room: Room, image: Compared, number: int) -> list[View]:
     ][:number]
 
 
-def _match_view(room: Room, view: View) -> MatchView:
+def match_view_of(room: Room, view: View) -> MatchView:
+    """A view as the matcher takes it."""
     return MatchView(
         gray=read_gray(room.colmap.image_path(view.name)),
         K=index_K(view.camera),

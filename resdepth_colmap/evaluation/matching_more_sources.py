@@ -26,31 +26,23 @@ MORE_SOURCES = 20
 NUM_WORST = 3
 """Images that are matched again in the geometric pass."""
 
-NUM_TWICE = 1
-"""Those of them that are matched again in both passes."""
-
 
 def measure_more_sources(folders: Folders) -> Result:
-    """More sources for the images that agree least.
+    """More sources in the geometric pass, for the images that agree least.
 
-    First in the geometric pass alone, which goes on from the same photometric maps,
-    made with as many sources as by default; then, for the worst, in both passes.
+    It goes on from the same photometric maps, made with as many sources as by default.
     """
     room = matched_room(folders)
     before = {name: _agreement(room, name) for name in room.theirs}
     worst = sorted(before, key=lambda name: before[name]["0.02"])[:NUM_WORST]
     path = folders.cache / f"{NAME}_{MORE_SOURCES}_sources"
     maps: Result = {}
-    for place, name in enumerate(worst):
+    for name in worst:
         maps[name] = {
             "before_kind": room.last_kind(name),
             "before": before[name],
             "geometric": _with_more(room, seeded_workspace(room.matched, path), name),
         }
-        if place < NUM_TWICE:
-            own = path.with_name(f"{path.name}_{name.replace('/', '_')}")
-            seeded = seeded_workspace(room.matched, own, but=name)
-            maps[name]["both"] = _with_more(room, seeded, name)
     return {"num_sources": MORE_SOURCES, "maps": maps}
 
 
@@ -70,23 +62,16 @@ def _agreement(room: Room, name: str) -> dict[str, float]:
     return shares_within(depth, oracle, room.counts(name) > 0, LIMITS)
 
 
-def seeded_workspace(
-    source: MatchedWorkspace, path: Path, but: str = ""
-) -> MatchedWorkspace:
+def seeded_workspace(source: MatchedWorkspace, path: Path) -> MatchedWorkspace:
     """Another workspace whose photometric maps are copies, as if others had made them.
 
     So they are never made again, whatever the options are.
-
-    Args:
-        source: Whose maps are copied.
-        path: Where the other one is, or will be.
-        but: Name of an image whose maps are not.
     """
     seeded = matched_workspace(source.path, path)
     for folder in ("depth_maps", "normal_maps"):
         target = seeded.workspace.stereo_path / folder
         target.mkdir(exist_ok=True)
-        for name in {view.name for view in source.scene.views} - {but}:
+        for name in (view.name for view in source.scene.views):
             file = Path(folder) / f"{name}.{KINDS[0]}.bin"
             original, copy = (
                 w.stereo_path / file for w in (source.workspace, seeded.workspace)

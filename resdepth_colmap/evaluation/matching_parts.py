@@ -18,6 +18,7 @@ from resdepth_colmap.evaluation.matched_workspace import (
     matched_workspace,
 )
 from resdepth_colmap.evaluation.matching_disagreement import measure_disagreement
+from resdepth_colmap.evaluation.matching_from_theirs import measure_from_theirs
 from resdepth_colmap.evaluation.matching_meeting_room import measure_meeting_room
 from resdepth_colmap.evaluation.matching_more_sources import measure_more_sources
 from resdepth_colmap.evaluation.matching_passes import (
@@ -179,6 +180,7 @@ PARTS: dict[str, Callable[[Folders], Result]] = {
     "meeting_room": measure_meeting_room,
     "more_sources": measure_more_sources,
     "disagreement": measure_disagreement,
+    "from_theirs": measure_from_theirs,
     "middlebury": measure_middlebury,
     "rendered": measure_rendered,
     "plant": measure_plant,

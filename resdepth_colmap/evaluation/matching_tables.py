@@ -13,6 +13,7 @@ from resdepth_colmap.evaluation.markdown import (
 )
 from resdepth_colmap.evaluation.matching_disagreement_tables import (
     disagreement_parts,
+    from_theirs_parts,
     more_sources_parts,
 )
 
@@ -225,6 +226,7 @@ PARTS = {
     "meeting_room": _meeting_room,
     "more_sources": more_sources_parts,
     "disagreement": disagreement_parts,
+    "from_theirs": from_theirs_parts,
     "middlebury": _middlebury,
     "rendered": _rendered,
     "plant": _plant,

@@ -10,18 +10,24 @@ from planes import NAMES, write_plane_workspace
 
 from resdepth_colmap.evaluation import matched_workspace as module
 from resdepth_colmap.evaluation.matching_disagreement import measure_disagreement
+from resdepth_colmap.evaluation.matching_from_theirs import (
+    BAND_ROWS,
+    band_of,
+    measure_from_theirs,
+    worst_rows,
+)
 from resdepth_colmap.evaluation.matching_meeting_room import (
     matched_room,
     measure_meeting_room,
 )
 from resdepth_colmap.evaluation.matching_more_sources import (
     MORE_SOURCES,
-    NUM_TWICE,
     NUM_WORST,
     measure_more_sources,
 )
 from resdepth_colmap.evaluation.matching_passes import Folders
 from resdepth_colmap.io.depth_map import read_depth_map
+from resdepth_colmap.matching.patch_match import MatchView, Surface
 
 
 @pytest.fixture(autouse=True)
@@ -102,9 +108,7 @@ def test_more_sources_start_from_the_same_photometric_maps(
     assert len(result["maps"]) == NUM_WORST
     calls = matcher.calls[num_before:]
     starts = [call.start is not None for call in calls]
-    # The worst image: geometric, then both passes; the others: geometric.
-    assert starts == [True, False, True] + [True] * (NUM_WORST - NUM_TWICE)
-    assert all(depths.any() for depths in calls[2].source_depths or [])
+    assert starts == [True] * NUM_WORST
     assert result["num_sources"] == MORE_SOURCES
     name = next(iter(result["maps"]))
     copy = folders.cache / f"meeting_room_{MORE_SOURCES}_sources/stereo/depth_maps"
@@ -115,3 +119,44 @@ def test_more_sources_start_from_the_same_photometric_maps(
     # What was made is kept.
     assert measure_more_sources(folders) == result
     assert len(matcher.calls) == num_before + len(starts)
+
+
+def test_the_band_is_where_most_pixels_differ() -> None:
+    disagree = np.zeros((500, 4), np.bool_)
+    disagree[200:230] = True
+    disagree[400:425] = True
+    rows = worst_rows(disagree)
+    assert rows.stop - rows.start == BAND_ROWS
+    assert rows.start <= 200
+    assert rows.stop >= 230
+    assert worst_rows(disagree[:50]) == slice(0, 50)
+
+
+def test_rows_of_a_view_are_seen_where_they_were() -> None:
+    gray = np.random.default_rng(0).random((9, 6), dtype=np.float32)
+    K = np.array([[5.0, 0, 3], [0, 5, 4], [0, 0, 1]])
+    view = MatchView(gray=gray, K=K, cam_from_world=np.eye(3, 4))
+    band = band_of(view, slice(2, 7))
+    np.testing.assert_array_equal(band.gray, gray[2:7])
+    np.testing.assert_array_equal(band.K @ [0, 0, 1], [3, 2, 1])
+    np.testing.assert_array_equal(view.K, K)
+
+
+def test_from_their_map_what_is_found_is_compared_with_both(
+    folders: Folders, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from resdepth_colmap.evaluation import matching_from_theirs
+
+    # A matcher that stays where it starts, and one that finds a depth of 4 everywhere.
+    def stays(reference: MatchView, *rest: object, start: Surface) -> Surface:
+        assert reference.gray.shape == start.depth.shape
+        return start
+
+    for matcher, stay, back in ((stays, 1.0, 0.0), (FakeMatcher(), 0.0, 1.0)):
+        monkeypatch.setattr(matching_from_theirs, "match_view", matcher)
+        result = measure_from_theirs(folders)
+        # A few pixels are near both: just beyond 2 % one way, within it the other.
+        assert result["mean"]["stay"] == stay
+        assert result["mean"]["return"] == pytest.approx(back, abs=0.01)
+        for entry in result["maps"].values():
+            assert entry["after"] == (1.0 if stay else entry["before"])
