@@ -1,5 +1,6 @@
 """The tables of the paper's variants, and of what was added to the paper."""
 
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -23,10 +24,13 @@ BEYOND = {
     "gate": "+ learned gate",
     "loss": "+ relative and logarithmic loss",
     "confidence": "+ confidence head (Laplace likelihood)",
-    "source_depth": "+ depth map of the source, carried over",
+    "source_depth": "+ depth maps of other views (completion, two inputs)",
     "holes": "+ filtered and unfiltered maps in one network",
     "two_passes": "the same, two passes with shared weights",
 }
+LEAST_CHANGE = 0.02
+"""A smaller change of a ratio is not told: two seeds differ as much."""
+
 SETS = {"rendered": "held-out rendered scenes", "middlebury": "Middlebury"}
 
 NORMALISATIONS = {
@@ -68,7 +72,8 @@ def beyond_table(measured: Mapping[str, Any]) -> str:
         if all(name in result["arms"] for result in sets.values())
     ]
     table = markdown_table(" | ".join(["network", *columns]), rows)
-    return "\n\n".join([_measured_by(measured), table])
+    told = [_changes(SETS[key], result["arms"]) for key, result in sets.items()]
+    return "\n\n".join([_measured_by(measured), table, *told])
 
 
 def out_of_order(maes: Mapping[str, float]) -> list[tuple[str, str]]:
@@ -84,6 +89,27 @@ def out_of_order(maes: Mapping[str, float]) -> list[tuple[str, str]]:
         for better in names[place + 1 :]
         if maes[worse] < maes[better]
     ]
+
+
+def _changes(label: str, arms: Mapping[str, Any]) -> str:
+    """Which additions changed a ratio, each against the row before it."""
+    names = [name for name in BEYOND if name in arms and name != "unfiltered"]
+    told = []
+    for key, measure in (("mae_ratio", "MAE"), ("medae_ratio", "MedAE")):
+        better, worse = [], []
+        for before, name in itertools.pairwise(names):
+            change = arms[name][key] - arms[before][key]
+            if abs(change) >= LEAST_CHANGE:
+                kind = better if change < 0 else worse
+                kind.append(f"{BEYOND[name].removeprefix('+ ')} ({change:+.2f})")
+        told.append(
+            f"{measure} ratio lower with {'; '.join(better) or 'nothing'}, "
+            f"higher with {'; '.join(worse) or 'nothing'}"
+        )
+    return (
+        f"{label.capitalize()}, changes of at least {LEAST_CHANGE} against the row "
+        f"before: {'. '.join(told)}."
+    )
 
 
 def _measured_by(measured: Mapping[str, Any]) -> str:

@@ -86,3 +86,15 @@ def test_an_addition_that_was_not_trained_has_no_row() -> None:
     text = beyond_table(measured(unfiltered=0.1, robust=0.1))
     assert BEYOND["robust"] in text
     assert BEYOND["gate"] not in text
+
+
+def test_it_is_told_what_each_addition_changed_against_the_row_before() -> None:
+    found = measured(unfiltered=0.1, resdepth_stereo=0.1, robust=0.1, inputs=0.1)
+    arms = found["sets"]["rendered"]["arms"]
+    arms["robust"]["mae_ratio"] = 0.7  # 0.9 before
+    arms["inputs"] |= {"mae_ratio": 0.75, "medae_ratio": 1.11}  # 0.7, 1.1 before
+    text = beyond_table(found)
+    assert "MAE ratio lower with robust normalisation (-0.20), higher with " in text
+    assert (
+        "inputs (+0.05). MedAE ratio lower with nothing, higher with nothing." in text
+    )
