@@ -25,6 +25,7 @@ from resdepth_colmap.evaluation.model_card import training_table, weights_table
 from resdepth_colmap.evaluation.variant_tables import beyond_table, variants_table
 
 DEPTHS = {"unfiltered": "unfiltered", "median": "5 x 5 median", "refined": "refined"}
+ARMS = ("unfiltered", "refined")
 
 Measured = Mapping[str, Any]
 """A file of docs/measurements, parsed."""
@@ -84,6 +85,20 @@ def middlebury_summary(measured: Measured) -> str:
     )
 
 
+def agreement_table(measured: Measured) -> str:
+    """One row an image: how much of a filtered map there is before and after."""
+    limits = {"within_1": "1 %", "within_2": "2 %", "within_5": "5 %"}
+    rows = [
+        [name, percent(image["known"])]
+        + [percent(image[arm][key]) for key in limits for arm in ARMS]
+        for name, image in measured["images"].items()
+    ]
+    header = "image | filled in COLMAP's filtered map | " + " | ".join(
+        f"within {limit}: {arm}" for limit in limits.values() for arm in ARMS
+    )
+    return "\n\n".join([markdown_table(header, rows), _measured_by(measured)])
+
+
 def workspaces_table(measured: Measured) -> str:
     """Seconds a stage, memory, and what there was before and after."""
     stages = list(
@@ -127,6 +142,7 @@ DOCUMENTS: dict[str, dict[str, Renderer]] = {
         "middlebury": middlebury_table,
         "middlebury_completed": middlebury_summary,
         "held_out": middlebury_summary,
+        "agreement": agreement_table,
         "workspaces": workspaces_table,
         "refine": refine_table,
         "variants": variants_table,
@@ -240,12 +256,29 @@ def _mean_errors(measured: Measured, key: str) -> dict[str, float | None]:
 
 def _ratio_sentence(measured: Measured) -> str:
     mean, passes = measured["mean"], measured["options"]["refine"]["passes"]
-    return (
-        f"Refined over unfiltered, mean of {len(measured['scenes'])} scenes: MAE "
-        f"{number(mean['mae_ratio'], digits=2)}, "
-        f"MedAE {number(mean['medae_ratio'], digits=2)} "
-        f"({passes} {'pass' if passes == 1 else 'passes'})."
+    scenes = measured["scenes"].values()
+    num_fewer = sum(
+        scene["refined"]["bad_2"] < scene["unfiltered"]["bad_2"] for scene in scenes
     )
+    ratios = [
+        f"{label} {number(mean[f'{key}_ratio'], digits=2)} (the worst scene "
+        f"{number(_largest_ratio(measured, key), digits=2)})"
+        for key, label in (("mae", "MAE"), ("medae", "MedAE"))
+    ]
+    return (
+        f"Refined over unfiltered, mean of {len(scenes)} scenes, "
+        f"{passes} {'pass' if passes == 1 else 'passes'}: {', '.join(ratios)}; fewer "
+        f"pixels off by more than 2 % in {num_fewer} of {len(scenes)}."
+    )
+
+
+def _largest_ratio(measured: Measured, key: str) -> float | None:
+    ratios = [
+        scene["refined"][key] / scene["unfiltered"][key]
+        for scene in measured["scenes"].values()
+        if scene["refined"][key] is not None and scene["unfiltered"][key]
+    ]
+    return max(ratios, default=None)
 
 
 def _measured_by(measured: Measured) -> str:

@@ -7,6 +7,7 @@ import pytest
 
 from resdepth_colmap.evaluation.tables import (
     DOCUMENTS,
+    agreement_table,
     filled_in,
     middlebury_summary,
     middlebury_table,
@@ -72,7 +73,8 @@ def test_the_summary_has_one_row_a_scene() -> None:
     text = middlebury_summary(middlebury())
     assert "| Teddy | 0.200 | 0.150 | 0.100 | 25.0 % | 25.0 % |" in text
     assert "| **mean** | 0.300 | 0.150 | 0.100 |" in text
-    assert "MAE 0.38, MedAE - (2 passes)" in text
+    assert "2 scenes, 2 passes: MAE 0.38 (the worst scene 0.50), MedAE - (" in text
+    assert "fewer pixels off by more than 2 % in 0 of 2" in text
     assert len(columns(text)) == 1
 
 
@@ -146,3 +148,19 @@ def test_a_broken_place_is_refused(text: str) -> None:
 
 def test_what_was_not_measured_has_no_text(tmp_path: Path) -> None:
     assert rendered("docs/benchmarks.md", tmp_path) == {}
+
+
+def test_the_agreement_has_one_row_an_image_and_both_arms_side_by_side() -> None:
+    limits = ("within_1", "within_2", "within_5")
+    image = {
+        "known": 0.5,
+        "unfiltered": dict(zip(limits, (0.8, 0.85, 0.9), strict=True)),
+        "refined": dict(zip(limits, (0.81, 0.86, 0.91), strict=True)),
+    }
+    measured = {**middlebury(), "images": {"a.png": image, "b.png": image}}
+    text = agreement_table(measured)
+    assert (
+        "| a.png | 50.0 % | 80.0 % | 81.0 % | 85.0 % | 86.0 % | 90.0 % | 91.0 % |"
+        in (text)
+    )
+    assert columns(text) == {9}
