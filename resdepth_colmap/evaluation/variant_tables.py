@@ -29,7 +29,7 @@ BEYOND = {
     "two_passes": "the same, two passes with shared weights",
 }
 LEAST_CHANGE = 0.02
-"""A smaller change of a ratio is not told: two seeds differ as much."""
+"""A smaller change of a ratio is not told: views are few, and trainings short."""
 
 SETS = {"rendered": "held-out rendered scenes", "middlebury": "Middlebury"}
 
