@@ -224,7 +224,7 @@ def parsed() -> argparse.Namespace:
     parser.add_argument("--watch", type=Path, nargs="*", default=[])
     parser.add_argument("--work", type=Path, required=True, help="weights and samples")
     parser.add_argument("--parts", nargs="+", choices=PARTS, default=list(PARTS))
-    parser.add_argument("--steps", type=int, default=600)
+    parser.add_argument("--steps", type=int, default=400)
     parser.add_argument("--width", type=int, default=8, help="base channels")
     parser.add_argument("--levels", type=int, default=NetworkConfig.levels)
     parser.add_argument("--crop-px", type=int, default=256)
