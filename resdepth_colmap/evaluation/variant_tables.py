@@ -96,7 +96,8 @@ def _changes(label: str, arms: Mapping[str, Any]) -> str:
     names = [name for name in BEYOND if name in arms and name != "unfiltered"]
     told = []
     for key, measure in (("mae_ratio", "MAE"), ("medae_ratio", "MedAE")):
-        better, worse = [], []
+        better: list[str] = []
+        worse: list[str] = []
         for before, name in itertools.pairwise(names):
             change = arms[name][key] - arms[before][key]
             if abs(change) >= LEAST_CHANGE:
