@@ -11,19 +11,20 @@ KEPT_CONSISTENCY = 0.15
 FILTERED_SHARE = 0.95
 """A map with less of its pixels filled has been filtered."""
 
-KEPT_CHANGE, KEPT_CONFIRMED_CHANGE = 0.05, 0.2
-"""Relative changes that are no correction of an outlier: a depth stays that a filter or
-the photographs confirm, and one that a map of another view does."""
+KEPT_CHANGE = 0.05
+"""Relative change that is no correction of an outlier: a confirmed depth stays."""
+
+CONFIRMED_ERRORS = 2.0
+"""What another view's map confirms stays unless it is changed by so many times the
+error that the network expects of its result; anything else, by once that."""
 
 
-def undone_change(tensors: ViewTensors) -> Tensor:
+def kept_change(tensors: ViewTensors) -> Tensor:
     """The relative change below which the initial depth is put back.
 
-    A larger change is the correction of an outlier. `KEPT_CONFIRMED_CHANGE` where the
-    depth map of another view says the same: views that were matched by themselves agree
-    by chance only rarely. `KEPT_CHANGE` where a filter has left the depth, which it has
-    seen in several views, or where the photographs confirm it. 0 for what was not
-    measured.
+    A larger change is the correction of an outlier. `KEPT_CHANGE` where the depth map
+    of another view says the same, where a filter has left the depth, or where the
+    photographs confirm it; 0 elsewhere, and for what was not measured.
 
     Args:
         tensors: A view with its initial depth.
@@ -40,10 +41,16 @@ def undone_change(tensors: ViewTensors) -> Tensor:
         is_kept &= valid
     else:
         is_kept = torch.zeros_like(valid)
-    change = torch.where(is_kept, KEPT_CHANGE, 0.0)
     if tensors.confirmed is not None:
-        change = torch.where(tensors.confirmed, KEPT_CONFIRMED_CHANGE, change)
-    return change
+        is_kept = is_kept | tensors.confirmed
+    return torch.where(is_kept, KEPT_CHANGE, 0.0)
+
+
+def kept_errors(tensors: ViewTensors) -> Tensor:
+    """The expected errors below which a change is none, shape (B, 1, H, W) or ()."""
+    if tensors.confirmed is None:
+        return torch.tensor(1.0, device=tensors.valid.device)
+    return torch.where(tensors.confirmed, CONFIRMED_ERRORS, 1.0)
 
 
 def is_filtered(valid: Tensor) -> bool:

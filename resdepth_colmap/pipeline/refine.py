@@ -22,7 +22,7 @@ from resdepth_colmap.pipeline.inputs import (
     photo_consistency,
     warp_sources,
 )
-from resdepth_colmap.pipeline.kept_depth import undone_change
+from resdepth_colmap.pipeline.kept_depth import kept_change, kept_errors
 from resdepth_colmap.pipeline.source_maps import SourceMap, start_from
 from resdepth_colmap.pipeline.tiling import Window, apply_tiled, pad_to_multiple
 from resdepth_colmap.scene import DepthMap, FloatMap, GrayImage, Matrix, NormalMap
@@ -129,17 +129,17 @@ def refine_view(
         low = float(measured.min()) * LEAST_INVERSE_RATIO
         high = float(measured.max()) * LARGEST_INVERSE_RATIO
         initial = tensors.inverse_depth
-        undone = undone_change(tensors) * initial
+        least_change, num_errors = kept_change(tensors) * initial, kept_errors(tensors)
         for _ in range(config.passes):
             stack = build_inputs(tensors, network.config)
             outputs = _run_tiled(stack, network, config).to(device)[None]
             refined = (tensors.inverse_depth + outputs[:, :1]).clamp(low, high)
             if config.keep_confirmed:
-                limit = undone
+                limit = least_change
                 if network.config.confidence:
-                    limit = torch.maximum(undone, outputs[:, 1:2])
-                is_undone = (refined - initial).abs() < limit
-                refined = torch.where(is_undone, initial, refined)
+                    limit = torch.maximum(limit, num_errors * outputs[:, 1:2])
+                is_kept = (refined - initial).abs() < limit
+                refined = torch.where(is_kept, initial, refined)
             tensors = tensors._replace(inverse_depth=refined)
         if network.config.confidence:
             error = outputs[:, 1:2]
