@@ -49,6 +49,9 @@ bench: $(READY)  ## measure what docs/benchmarks.md reports
 	$(BIN)/python scripts/bench_matching.py
 	$(BIN)/python scripts/bench_stereo_memory.py
 	$(BIN)/python scripts/bench_middlebury.py
+	$(BIN)/python scripts/bench_middlebury.py --without-network
+	$(BIN)/python scripts/bench_held_out.py
+	$(BIN)/python scripts/bench_agreement.py
 	$(BIN)/python scripts/bench_refine.py
 	$(BIN)/python scripts/bench_workspaces.py
 	$(BIN)/python scripts/bench_compare.py
