@@ -14,8 +14,8 @@ CHANNELS = {
     "source_0": "the second photo, warped onto that depth",
     "valid": "which depth was measured, not filled",
     "photo_consistency": "how well the two photos agree (7 x 7 correlation)",
-    "carried_change": "where the second photo's own depth map differs",
-    "carried": "where that map arrives at all",
+    "carried_change": "where the depth maps of other views differ",
+    "carried": "where any of these says something",
 }
 
 

@@ -7,7 +7,7 @@ from typing import Self
 from resdepth_colmap.config import Config
 
 CARRIED_CHANGE, CARRIED = "carried_change", "carried"
-"""Channels of the source's depth map in the reference: where it differs, and is."""
+"""Channels of other views' depth maps in the reference: where they differ, and are."""
 
 
 class InputVariant(enum.StrEnum):
@@ -38,8 +38,8 @@ class NetworkConfig(Config):
         num_sources: Warped second views (variants stereo and images-only).
         valid: Give it the mask of pixels whose depth was real, not filled.
         photo_consistency: Give it the local correlation of reference and warped view.
-        source_depth: Give it the depth map of the first source, carried into the
-            reference: where it differs, and where nothing arrives.
+        source_depth: Compare its input with the depth maps of other views, which
+            complete it, and give it where they differ and where nothing arrives.
         gate: Let it weigh its residual by a learned gate in 0..1.
         last_block: One more convolution block at full resolution, before the last
             convolution: lets it weigh fine structure by what surrounds it.

@@ -106,6 +106,7 @@ def refine_workspace(
     }
     options = {
         "passes": config.passes,
+        "keep_confirmed": config.keep_confirmed,
         "tile_px": config.tile_px,
         "overlap_px": config.overlap_px,
         "weights": facts["weights_sha256"],

@@ -209,6 +209,7 @@ def test_other_options_or_weights_mean_again(tmp_path: Path) -> None:
     refine(folder)
     assert len(refine(folder, passes=2).refined) == len(NAMES)
     assert len(refine(folder, passes=2).refined) == 0
+    assert len(refine(folder, passes=2, keep_confirmed=False).refined) == len(NAMES)
     other = identity_weights(tmp_path, seed=1)
     assert len(refine(folder, passes=2, weights=other).refined) == len(NAMES)
     again = refine(folder, passes=2, weights=other, overwrite=True)
