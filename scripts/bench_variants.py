@@ -212,7 +212,6 @@ def beyond_arms(trainer: Trainer) -> Arms:
 
 PARTS = {
     "variants": (paper_arms, variants_table, Normalisation.ROBUST),
-    "variants_baseline": (paper_arms, variants_table, Normalisation.BASELINE),
     "beyond": (beyond_arms, beyond_table, Normalisation.BASELINE),
 }
 

@@ -146,7 +146,6 @@ DOCUMENTS: dict[str, dict[str, Renderer]] = {
         "workspaces": workspaces_table,
         "refine": refine_table,
         "variants": variants_table,
-        "variants_baseline": variants_table,
         "beyond": beyond_table,
         "middlebury_rough": middlebury_summary,
         "commands": command_table,

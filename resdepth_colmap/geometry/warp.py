@@ -67,7 +67,9 @@ def project_homogeneous(
     """Homogeneous source pixels, shape (B, 3, H, W), without dividing by depth.
 
     K_s (R z K_r^-1 x + t) is, up to the scale z, (K_s R K_r^-1) x + (K_s t) / z:
-    linear in the inverse depth, and well behaved as the depth goes to infinity.
+    linear in the inverse depth, and well behaved as the depth goes to infinity. The
+    arguments are those of `warp_to_reference`; the third coordinate is the depth in the
+    source over that in the reference.
     """
     dtype, device = inverse_depth.dtype, inverse_depth.device
     # The small matrices in double precision: 1e-7 of 5000 px is a visible error. On the
