@@ -6,10 +6,10 @@
 The paper's part: unfiltered PatchMatch, its 5 x 5 median, Unet-stereo (images only),
 ResDepth-0, -mono, -stereo and -stereo_iter (paper, section "Network Variants"): the
 paper's networks, narrower, and its plain L1 loss, with a learning rate that fits the
-budget; once with inverse depth over its spread, as the paper's ablation study divides
-heights by their standard deviation, and once with inverse depth times the baseline, as
-in its experiment on ETH3D. The part beyond the paper begins with the latter's
-ResDepth-stereo and adds one thing after the other. Each view counts with the map that a
+budget and inverse depth over its spread, as the paper's ablation study divides heights
+by their standard deviation. The part beyond the paper begins with a ResDepth-stereo on
+inverse depth times the baseline, as in the paper's experiment on ETH3D, and adds one
+thing after the other. Each view counts with the map that a
 refinement starts from; a scene without maps is matched in a copy. No rule is applied
 after a network. Scenes are held out as a whole. Goes on where it stopped. Each part's
 figures go to docs/measurements/; then `python scripts/make_tables.py` puts them into
