@@ -18,6 +18,9 @@ GrayImage = npt.NDArray[np.float32]
 ColorImage = npt.NDArray[np.uint8]
 """RGB values, shape (H, W, 3)."""
 
+UnitColors = npt.NDArray[np.float32]
+"""RGB values in 0..1, shape (H, W, 3)."""
+
 FloatMap = npt.NDArray[np.float32]
 """Any other value a pixel, shape (H, W)."""
 

@@ -82,10 +82,11 @@ ADDITIONS = {
     "inputs": Options({"valid": True, "photo_consistency": True}),
     "last_block": Options({"last_block": True}),
     "gate": Options({"gate": True}),
-    "loss": Options(training={"relative": True, "log_weight": 0.1}),
+    "loss": Options(training={"distance_power": 1.0, "log_weight": 0.1}),
     "confidence": Options({"confidence": True}, {"confidence_weight": 0.05}),
     "source_depth": Options({"source_depth": True}),
     "holes": Options(training={"holes_share": TrainConfig.holes_share}),
+    "color": Options({"color": True}),
 }
 """Beyond the paper; each row keeps what those before it have."""
 

@@ -102,6 +102,7 @@ def _inputs(case: DepthCase, initial: InitialDepth) -> ViewInputs:
     return ViewInputs(
         depth=initial.depth,
         gray=case.reference.gray,
+        colors=case.colors,
         K=case.reference.K,
         sources=tuple(
             SourceView(

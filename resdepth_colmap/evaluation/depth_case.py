@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from resdepth_colmap.config import StereoConfig
 from resdepth_colmap.matching.patch_match import MatchView
-from resdepth_colmap.scene import DepthMap, Matrix
+from resdepth_colmap.scene import DepthMap, Matrix, UnitColors
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
@@ -42,6 +42,7 @@ class DepthCase:
         seen: Which pixels the first source sees too, shape (H, W), bool; None = not
             known.
         initial: Depth that is there already; None = it has to be matched.
+        colors: The reference in colour, RGB, shape (H, W, 3), in 0..1; None = grey.
     """
 
     name: str
@@ -51,6 +52,7 @@ class DepthCase:
     truth: DepthMap
     seen: npt.NDArray[np.bool_] | None = None
     initial: InitialDepth | None = None
+    colors: UnitColors | None = None
 
     @property
     def megapixels(self) -> float:

@@ -35,10 +35,10 @@ from resdepth_colmap.io.eth3d import (
     Eth3dScene,
     find_eth3d_scenes,
 )
-from resdepth_colmap.io.images import read_gray
+from resdepth_colmap.io.images import read_gray, read_unit_colors
 from resdepth_colmap.io.model import read_scene
 from resdepth_colmap.matching.patch_match import MatchView
-from resdepth_colmap.pipeline.view_images import camera_at_scale, resized_gray
+from resdepth_colmap.pipeline.view_images import camera_at_scale, resized_image
 from resdepth_colmap.scene import Camera, Scene, View
 
 
@@ -165,6 +165,10 @@ class _SceneReader:
             sources=(self._match_view(source),),
             depth_range=(near, far),
             truth=truth,
+            colors=resized_image(
+                read_unit_colors(self.files.image_path(reference.name)),
+                (camera.width_px, camera.height_px),
+            ),
         )
 
     def _distorted(self, view: View) -> DistortedView:
@@ -192,7 +196,7 @@ class _SceneReader:
             )
         camera = self._camera(view)
         return MatchView(
-            gray=resized_gray(gray, (camera.width_px, camera.height_px)),
+            gray=resized_image(gray, (camera.width_px, camera.height_px)),
             K=index_K(camera),
             cam_from_world=view.cam_from_world,
         )

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.evaluation.depth_case import CaseOptions, DepthCase, LazyCase
-from resdepth_colmap.io.images import read_gray
+from resdepth_colmap.io.images import read_gray, read_unit_colors
 from resdepth_colmap.io.pfm import read_pfm
 from resdepth_colmap.matching.patch_match import MatchView
 from resdepth_colmap.scene import DepthMap, FloatMap, Matrix
@@ -78,6 +78,7 @@ def read_middlebury_case(path: Path, options: CaseOptions) -> DepthCase:
         depth_range=(near, far) if near > 0 else _depth_range(calibration),
         truth=depth_from_disparity(disparity, calibration),
         seen=seen,
+        colors=read_unit_colors(path / IMAGE_NAMES[0]),
     )
 
 

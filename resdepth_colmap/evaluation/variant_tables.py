@@ -26,6 +26,7 @@ BEYOND = {
     "confidence": "+ confidence head (Laplace likelihood)",
     "source_depth": "+ depth maps of other views (completion, two inputs)",
     "holes": "+ filtered and unfiltered maps in one network",
+    "color": "+ the reference in colour",
     "two_passes": "the same, two passes with shared weights",
 }
 LEAST_CHANGE = 0.02

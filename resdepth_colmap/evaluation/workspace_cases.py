@@ -110,6 +110,7 @@ def _case(
         truth=truth,
         seen=_seen(workspace, view),
         initial=initial,
+        colors=images.colors(view, view.camera),
     )
 
 

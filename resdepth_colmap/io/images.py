@@ -17,7 +17,7 @@ from PIL import Image, UnidentifiedImageError
 from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.io.files import write_whole
 from resdepth_colmap.io.png import encode_png
-from resdepth_colmap.scene import ColorImage, GrayImage
+from resdepth_colmap.scene import ColorImage, GrayImage, UnitColors
 
 # Rec. 709, the weights of COLMAP's own conversion to grey.
 _LUMA = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
@@ -39,15 +39,23 @@ def read_gray(path: Path) -> GrayImage:
     return values if values.ndim == 2 else values @ _LUMA
 
 
+def read_unit_colors(path: Path) -> UnitColors:
+    """Read a photo as RGB values in 0..1, shape (H, W, 3), float32; alpha is dropped.
+
+    Raises:
+        WorkspaceError: If the file is not there or no image.
+    """
+    values = _read_unit(path)
+    return values if values.ndim == 3 else np.repeat(values[..., np.newaxis], 3, 2)
+
+
 def read_rgb(path: Path) -> ColorImage:
     """Read a photo as RGB values, shape (H, W, 3), uint8; alpha is dropped.
 
     Raises:
         WorkspaceError: If the file is not there or no image.
     """
-    values = _read_unit(path)
-    rounded = (values * 255 + 0.5).astype(np.uint8)
-    return rounded if rounded.ndim == 3 else np.repeat(rounded[..., np.newaxis], 3, 2)
+    return (read_unit_colors(path) * 255 + 0.5).astype(np.uint8)
 
 
 def image_size(path: Path) -> tuple[int, int]:

@@ -9,6 +9,9 @@ from resdepth_colmap.config import Config
 CARRIED_CHANGE, CARRIED = "carried_change", "carried"
 """Channels of other views' depth maps in the reference: where they differ, and are."""
 
+RED, BLUE = "red", "blue"
+"""Channels of the reference in colour, besides its grey values."""
+
 
 class InputVariant(enum.StrEnum):
     """What the network sees (paper, section "Network Variants")."""
@@ -40,6 +43,7 @@ class NetworkConfig(Config):
         photo_consistency: Give it the local correlation of reference and warped view.
         source_depth: Compare its input with the depth maps of other views, which
             complete it, and give it where they differ and where nothing arrives.
+        color: Give it the reference in colour, which tells edges that grey does not.
         gate: Let it weigh its residual by a learned gate in 0..1.
         last_block: One more convolution block at full resolution, before the last
             convolution: lets it weigh fine structure by what surrounds it.
@@ -55,6 +59,7 @@ class NetworkConfig(Config):
     valid: bool = True
     photo_consistency: bool = True
     source_depth: bool = True
+    color: bool = True
     gate: bool = True
     last_block: bool = True
     confidence: bool = True
@@ -87,6 +92,7 @@ class NetworkConfig(Config):
             last_block=False,
             photo_consistency=False,
             source_depth=False,
+            color=False,
             confidence=False,
             normalisation=Normalisation.BASELINE,
         )
@@ -115,6 +121,8 @@ class NetworkConfig(Config):
             names.append("photo_consistency")
         if self.source_depth and self.uses_sources and self.residual:
             names += [CARRIED_CHANGE, CARRIED]
+        if self.color and self.variant is not InputVariant.DEPTH_ONLY:
+            names += [RED, BLUE]
         return tuple(names)
 
     @property

@@ -17,8 +17,10 @@ from resdepth_colmap.geometry.holes import fill_holes
 from resdepth_colmap.geometry.inverse_depth import invert_map
 from resdepth_colmap.geometry.warp import warp_to_reference
 from resdepth_colmap.network.network_config import (
+    BLUE,
     CARRIED,
     CARRIED_CHANGE,
+    RED,
     NetworkConfig,
     Normalisation,
 )
@@ -62,6 +64,8 @@ class ViewTensors(NamedTuple):
             0 = nothing. None = there are no such maps.
         confirmed: Where one of these says the same as the initial depth, shape (B, 1,
             H, W), bool; likewise.
+        colors: RGB values of the reference in 0..1, shape (B, 3, H, W); None = it is
+            grey.
     """
 
     inverse_depth: Tensor
@@ -71,6 +75,7 @@ class ViewTensors(NamedTuple):
     sources: tuple[SourceTensors, ...]
     carried: Tensor | None = None
     confirmed: Tensor | None = None
+    colors: Tensor | None = None
 
 
 class InputStack(NamedTuple):
@@ -149,6 +154,7 @@ def build_inputs(view: ViewTensors, config: NetworkConfig) -> InputStack:
         The stack, on the device and in the type of the view's inverse depth.
     """
     channels = {"reference": view.gray, "valid": view.valid.to(view.gray.dtype)}
+    channels |= _color_channels(view)
     if config.uses_sources:
         warped = warp_sources(view, config.num_sources)
         channels["photo_consistency"] = photo_consistency(view.gray, warped)
@@ -251,6 +257,13 @@ def network_input(stack: InputStack, config: NetworkConfig) -> tuple[Tensor, Sca
         after = guidance[:, place + 1 :]
         guidance = torch.cat([guidance[:, :place], change, after], dim=1)
     return torch.cat([normalised, guidance], dim=1), scaling
+
+
+def _color_channels(view: ViewTensors) -> dict[str, Tensor]:
+    """What grey does not tell: red and blue. Those of a grey photo are its grey."""
+    if view.colors is None:
+        return {RED: view.gray, BLUE: view.gray}
+    return {RED: view.colors[:, 0:1], BLUE: view.colors[:, 2:3]}
 
 
 def _carried_channels(view: ViewTensors) -> dict[str, Tensor]:

@@ -25,7 +25,14 @@ from resdepth_colmap.pipeline.inputs import (
 from resdepth_colmap.pipeline.kept_depth import kept_change, kept_errors
 from resdepth_colmap.pipeline.source_maps import SourceMap, start_from
 from resdepth_colmap.pipeline.tiling import Window, apply_tiled, pad_to_multiple
-from resdepth_colmap.scene import DepthMap, FloatMap, GrayImage, Matrix, NormalMap
+from resdepth_colmap.scene import (
+    DepthMap,
+    FloatMap,
+    GrayImage,
+    Matrix,
+    NormalMap,
+    UnitColors,
+)
 
 LEAST_INVERSE_RATIO = 0.25
 LARGEST_INVERSE_RATIO = 4.0
@@ -60,6 +67,7 @@ class ViewInputs:
     Attributes:
         depth: Initial depth, shape (H, W), in units; 0 = hole.
         gray: The image at the size of the depth map, shape (H, W), in 0..1.
+        colors: The same in colour, RGB, shape (H, W, 3), in 0..1; None = it has none.
         K: K for index coordinates at that size, shape (3, 3), in pixels.
         sources: Second views, best first; may be empty.
         source_maps: Depth maps of other views, the first that of the best; may be
@@ -71,6 +79,7 @@ class ViewInputs:
     K: Matrix
     sources: tuple[SourceView, ...] = ()
     source_maps: tuple[SourceMap, ...] = ()
+    colors: UnitColors | None = None
 
     def __post_init__(self) -> None:
         """Check that image and depth map have one size."""
@@ -78,6 +87,11 @@ class ViewInputs:
             raise ValueError(
                 f"{self.gray.shape=} but expected that of the depth map, "
                 f"{self.depth.shape}."
+            )
+        if self.colors is not None and self.colors.shape != (*self.depth.shape, 3):
+            raise ValueError(
+                f"{self.colors.shape=} but expected RGB values of the size of the "
+                f"depth map, {self.depth.shape}."
             )
 
 
@@ -218,6 +232,7 @@ def view_tensors(view: ViewInputs, device: torch.device, use_maps: bool) -> View
         inverse_depth=_image(start.inverse_depth, device),
         valid=_mask(start.valid, device),
         gray=_image(view.gray, device),
+        colors=None if view.colors is None else _colors(view.colors, device),
         K=torch.from_numpy(view.K)[None],
         sources=tuple(
             SourceTensors(
@@ -234,6 +249,11 @@ def view_tensors(view: ViewInputs, device: torch.device, use_maps: bool) -> View
 
 def _image(gray: GrayImage, device: torch.device) -> Tensor:
     return torch.from_numpy(np.array(gray, dtype=np.float32))[None, None].to(device)
+
+
+def _colors(colors: UnitColors, device: torch.device) -> Tensor:
+    planes = np.ascontiguousarray(colors.transpose(2, 0, 1), dtype=np.float32)
+    return torch.from_numpy(planes)[None].to(device)
 
 
 def _mask(flags: NDArray[np.bool_], device: torch.device) -> Tensor:

@@ -7,9 +7,16 @@ import cv2
 import numpy as np
 
 from resdepth_colmap.io.depth_map import read_depth_map
-from resdepth_colmap.io.images import read_gray
+from resdepth_colmap.io.images import read_gray, read_unit_colors
 from resdepth_colmap.io.workspace import Workspace
-from resdepth_colmap.scene import Camera, DepthMap, FloatMap, GrayImage, View
+from resdepth_colmap.scene import (
+    Camera,
+    DepthMap,
+    FloatMap,
+    GrayImage,
+    UnitColors,
+    View,
+)
 
 Size = tuple[int, int]
 
@@ -75,6 +82,17 @@ class ViewImages:
         size = (camera.width_px, camera.height_px)
         return self.cache.get((view.name, size), lambda: self._load_gray(view, size))
 
+    def colors(self, view: View, camera: Camera) -> UnitColors:
+        """RGB values of a view in 0..1, at the size of `camera`, float32.
+
+        Not kept: a view is looked at in colour once, as the reference.
+
+        Raises:
+            WorkspaceError: If the image is missing or cannot be read.
+        """
+        colors = read_unit_colors(self.workspace.image_path(view.name))
+        return resized_image(colors, (camera.width_px, camera.height_px))
+
     def depth(self, view: View, camera: Camera, kind: str) -> DepthMap:
         """A depth map of a view, at the size of `camera`, float32; 0 = no depth.
 
@@ -90,10 +108,7 @@ class ViewImages:
 
     def _load_gray(self, view: View, size: Size) -> GrayImage:
         gray = read_gray(self.workspace.image_path(view.name))
-        if gray.shape == size[::-1]:
-            return gray
-        # The area's mean, so that a smaller image shows no false patterns.
-        return resized_gray(gray, size)
+        return resized_image(gray, size)
 
     def _load_depth(self, view: View, size: Size, kind: str) -> DepthMap:
         path = self.workspace.depth_map_path(view.name, kind)
@@ -103,9 +118,14 @@ class ViewImages:
         return depth if depth.shape == size[::-1] else nearest_resized(depth, size)
 
 
-def resized_gray(gray: GrayImage, size: Size) -> GrayImage:
-    """An image at another (width, height), each pixel the mean of what it covers."""
-    result = cv2.resize(gray, size, interpolation=cv2.INTER_AREA)
+def resized_image(values: FloatMap, size: Size) -> FloatMap:
+    """An image, grey or in colour, at that (width, height).
+
+    Each pixel is the mean of what it covers: a smaller image shows no false patterns.
+    """
+    if values.shape[:2] == size[::-1]:
+        return values
+    result = cv2.resize(values, size, interpolation=cv2.INTER_AREA)
     return np.asarray(result, dtype=np.float32)
 
 

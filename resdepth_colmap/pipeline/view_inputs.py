@@ -49,6 +49,7 @@ def view_inputs(
     return ViewInputs(
         depth=depth,
         gray=images.gray(view, camera),
+        colors=images.colors(view, camera),
         K=index_K(camera),
         sources=tuple(second_views),
         source_maps=tuple(

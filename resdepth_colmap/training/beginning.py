@@ -17,7 +17,7 @@ SHIPPED = Path("shipped")
 """As the file to start from: the weights that come with the package."""
 
 _FIRST_KERNEL = "encoder.0.0.weight"
-_INPUTS = ("valid", "photo_consistency", "source_depth")
+_INPUTS = ("valid", "photo_consistency", "source_depth", "color")
 
 
 def chosen_network(

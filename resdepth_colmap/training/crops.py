@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from resdepth_colmap.errors import TrainingError
-from resdepth_colmap.network.network_config import NetworkConfig
+from resdepth_colmap.network.network_config import BLUE, RED, NetworkConfig
 from resdepth_colmap.pipeline.inputs import InputStack, network_input
 from resdepth_colmap.training.samples import (
     COMPLETED,
@@ -25,8 +25,8 @@ from resdepth_colmap.training.samples import (
     sample_size,
 )
 
-NEAR_TRUTH_WEIGHT = (0.3, 3.0)
-"""Range of the weight that turns errors of inverse depth into relative ones."""
+DISTANCE_RATIOS = (0.3, 3.0)
+"""Range of the true depth, over the tile's, that errors are weighed by."""
 
 
 ALONE_SHARE = 0.15
@@ -79,7 +79,7 @@ class CropSampler:
         seed: Seed of all choices.
         holes_share: Share of samples whose maps have holes.
         vary_light: Change brightness and contrast at random.
-        relative: Weigh pixels so that their errors are relative to the depth.
+        distance_power: Errors are weighed by the true depth to this power.
         valid_importance: How much a pixel of a valid depth counts, to one without.
     """
 
@@ -90,7 +90,7 @@ class CropSampler:
     seed: int
     holes_share: float = 0.2
     vary_light: bool = True
-    relative: bool = True
+    distance_power: float = 1.0
     valid_importance: float = 1.0
 
     def batch(self, step: int, rank: int = 0, num_ranks: int = 1) -> Batch:
@@ -118,14 +118,13 @@ class CropSampler:
         inputs, scaling = network_input(stack, self.config)
         target = _stacked([crop.target[None] for crop in crops])
         known = target > 0
-        weight = torch.ones_like(target)
-        if self.relative:
-            weight = scaling.offset / torch.where(known, target, scaling.offset)
+        distance = scaling.offset / torch.where(known, target, scaling.offset)
+        weight = distance.clamp(*DISTANCE_RATIOS) ** self.distance_power
         return Batch(
             inputs=inputs,
             target=scaling.normalise(target),
             known=known,
-            weight=weight.clamp(*NEAR_TRUTH_WEIGHT),
+            weight=weight,
             importance=self._importance(stack.valid),
             names=tuple(path.stem for path, _ in draws),
         )
@@ -223,12 +222,15 @@ class CropSampler:
         """Another gamma and brightness for all images, and a little for each."""
         names = [name for name in self.config.channels if name != "inverse_depth"]
         gamma, gain = np.exp(rng.normal(0.0, 0.15)), np.exp(rng.normal(0.0, 0.1))
+        lights: dict[str, NDArray[np.float64]] = {}
         for index, name in enumerate(names):
-            if name == "reference" or name.startswith("source"):
-                own = gamma * np.exp(rng.normal(0.0, 0.05))
-                gray = np.clip(guidance[index], 0.0, 1.0) ** own
-                gray = gray * gain * np.exp(rng.normal(0.0, 0.05))
-                guidance[index] = np.clip(gray, 0.0, 1.0)
+            image = "reference" if name in (RED, BLUE) else name
+            if image == "reference" or image.startswith("source"):
+                if image not in lights:  # one for all channels of an image
+                    lights[image] = np.exp(rng.normal(0.0, 0.05, size=2))
+                own_gamma, own_gain = lights[image]
+                values = np.clip(guidance[index], 0.0, 1.0) ** (gamma * own_gamma)
+                guidance[index] = np.clip(values * gain * own_gain, 0.0, 1.0)
         return guidance
 
 

@@ -34,7 +34,7 @@ DENSE, COMPLETED, HOLES = "-dense", "-completed", "-holes"
 """How the names of samples end: of a map without holes, of one that the maps of other
 views have been compared with, and of a map with holes."""
 
-_FORMAT = 5
+_FORMAT = 6
 
 
 class Sample(NamedTuple):

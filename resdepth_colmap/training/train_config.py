@@ -49,7 +49,8 @@ class TrainConfig(Config):
         optimiser: adam (the paper's) or adamw.
         schedule: Of the learning rate.
         largest_gradient: Norm that gradients are cut to; 0 = they are not.
-        relative: Weigh errors by the true depth, so that all distances count alike.
+        distance_power: Weigh errors of inverse depth by the true depth to this power:
+            1 = relative errors count, 2 = errors in units of length, 0 = the paper's.
         valid_importance: How much a pixel counts whose depth was measured (and
             confirmed by another map), to one that was filled in: the rule that keeps
             what is confirmed looks after the former.
@@ -81,7 +82,7 @@ class TrainConfig(Config):
     optimiser: Optimiser = Optimiser.ADAMW
     schedule: Schedule = Schedule.ONE_CYCLE
     largest_gradient: float = 1.0
-    relative: bool = True
+    distance_power: float = 1.5
     valid_importance: float = 0.3
     log_weight: float = 0.1
     confidence_weight: float = 0.05
@@ -161,6 +162,7 @@ _AT_LEAST_ONE = (
     "loaders",
 )
 _NOT_NEGATIVE = (
+    "distance_power",
     "weight_decay",
     "largest_gradient",
     "valid_importance",
@@ -175,7 +177,7 @@ _PAPER: dict[str, Any] = {
     "optimiser": Optimiser.ADAM,
     "schedule": Schedule.CONSTANT,
     "largest_gradient": 0.0,
-    "relative": False,
+    "distance_power": 0.0,
     "valid_importance": 1.0,
     "log_weight": 0.0,
     "confidence_weight": 0.0,

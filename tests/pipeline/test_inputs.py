@@ -11,8 +11,10 @@ from analytic_scene import (
 
 from resdepth_colmap.geometry.inverse_depth import inverse_depth
 from resdepth_colmap.network.network_config import (
+    BLUE,
     CARRIED,
     CARRIED_CHANGE,
+    RED,
     InputVariant,
     NetworkConfig,
     Normalisation,
@@ -256,3 +258,17 @@ def test_the_sources_map_is_shown_as_a_difference_in_the_tiles_own_scale() -> No
         said = scaling.restore(stack[:, :1] + stack[:, [change]])
         error = (said * pair.depth - 1).abs()[arrived[:, None]]
         assert float(error.max()) < 1e-9
+
+
+def test_in_colour_the_network_sees_red_and_blue_besides_grey() -> None:
+    config = NetworkConfig(color=True)
+    gray = view_of(plane_pair())
+    colors = torch.rand(1, 3, 48, 64)
+    for view, red, blue in (
+        (gray, gray.gray, gray.gray),
+        (gray._replace(colors=colors), colors[:, :1], colors[:, 2:]),
+    ):
+        stack = build_inputs(view, config)
+        for name, expected in ((RED, red), (BLUE, blue), ("reference", gray.gray)):
+            place = config.channels.index(name) - 1
+            assert torch.equal(stack.guidance[:, place : place + 1], expected)

@@ -160,3 +160,9 @@ def test_a_depth_map_without_any_depth_is_refused() -> None:
     empty = dataclasses.replace(initial, depth=np.zeros_like(initial.depth))
     with pytest.raises(ValueError, match="no pixel"):
         refine_view(empty, network(), TILES)
+
+
+def test_colours_of_another_size_are_a_bug_of_the_caller() -> None:
+    initial = view()
+    with pytest.raises(ValueError, match="colors"):
+        dataclasses.replace(initial, colors=np.zeros((3, 4, 3), np.float32))

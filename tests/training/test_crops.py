@@ -86,7 +86,7 @@ def test_images_of_different_sizes_share_a_batch(tmp_path: Path) -> None:
         scene = write_noisy_plane(tmp_path / name, size_px=size_px)
         paths += prepare_samples([scene], NETWORK, tmp_path / "cache")
     sampler = sampler_of(tuple(paths), batch_size=8, crop_px=512)
-    assert sampler.batch(0).inputs.shape == (8, 7, 56, 56)
+    assert sampler.batch(0).inputs.shape == (8, len(NETWORK.channels), 56, 56)
 
 
 def test_too_small_an_image_is_named(samples: tuple[Path, ...]) -> None:
@@ -100,7 +100,7 @@ def test_a_variant_sees_its_channels(
     samples: tuple[Path, ...], variant: InputVariant
 ) -> None:
     config = dataclasses.replace(NetworkConfig.paper(variant), levels=3)
-    batch = sampler_of(samples, config=config, relative=False).batch(0)
+    batch = sampler_of(samples, config=config, distance_power=0.0).batch(0)
     assert batch.inputs.shape[1] == len(config.channels)
     assert (batch.weight == 1).all()
     if config.residual:
@@ -123,7 +123,7 @@ def test_light_changes_photographs_alone(samples: tuple[Path, ...]) -> None:
     assert (dark.inputs[:, 1:] == 0).all()
     varied = sampler_of(samples, vary_light=True).batch(0)
     for index, name in enumerate(NETWORK.channels):
-        is_photo = name in ("reference", "source_0")
+        is_photo = name in ("reference", "source_0", "red", "blue")
         same = torch.equal(varied.inputs[:, index], plain.inputs[:, index])
         assert same != is_photo
 

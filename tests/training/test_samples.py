@@ -89,6 +89,8 @@ def test_all_variants_share_their_samples(tmp_path: Path) -> None:
         "photo_consistency",
         "carried_change",
         "carried",
+        "red",
+        "blue",
     )
     assert len(read_sample(paths[InputVariant.MONO][0]).guidance) == len(channels)
 

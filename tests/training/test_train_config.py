@@ -19,7 +19,7 @@ def test_the_paper_trains_with_plain_l1_and_adam() -> None:
     assert config.schedule is Schedule.CONSTANT
     assert (config.learning_rate, config.weight_decay) == (1e-5, 1e-5)
     assert (config.batch_size, config.crop_px) == (4, 512)
-    assert not config.relative
+    assert config.distance_power == 0
     assert not config.vary_light
     assert config.log_weight == config.confidence_weight == config.largest_gradient == 0
 
