@@ -60,7 +60,7 @@ STEREO, ITERATED = "resdepth_stereo", "resdepth_stereo_iter"
 REFINED_KIND = "refined"
 
 # The networks by themselves.
-REFINING = RefineConfig(passes=1, keep_confirmed=False)
+REFINING = RefineConfig(passes=1, keep_confirmed=False, follow_edges=False)
 
 
 class Options(NamedTuple):

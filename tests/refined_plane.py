@@ -18,7 +18,7 @@ from resdepth_colmap.pipeline.refine import SourceView, ViewInputs
 from resdepth_colmap.scene import cam_from_cam
 
 SMALL = {"levels": 2, "base_channels": 4, "max_channels": 8}
-TILES = RefineConfig(tile_px=32, overlap_px=8)
+TILES = RefineConfig(tile_px=32, overlap_px=8, follow_edges=False)
 HOLES = 0.2
 
 

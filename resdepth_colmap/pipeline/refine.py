@@ -23,6 +23,7 @@ from resdepth_colmap.pipeline.inputs import (
     warp_sources,
 )
 from resdepth_colmap.pipeline.kept_depth import kept_change, kept_errors
+from resdepth_colmap.pipeline.photo_edges import follow_edges
 from resdepth_colmap.pipeline.source_maps import SourceMap, start_from
 from resdepth_colmap.pipeline.tiling import Window, apply_tiled, pad_to_multiple
 from resdepth_colmap.scene import (
@@ -118,7 +119,8 @@ def refine_view(
     """Refine a depth map: fill, warp, run the network tile by tile, and again.
 
     Each pass warps the sources anew with the depth of the pass before. The mask of real
-    pixels stays that of the first: it tells the network what was measured. A measured
+    pixels stays that of the first: it tells the network what was measured. Edges of
+    what the network says are moved to those of the photo (docs/adr/0014). A measured
     depth that a map of another view confirms is kept, and one that the photographs
     confirm, where the network would change it only a little: matching is more exact
     there than the network. Nor is a change taken that is smaller than the error that
@@ -148,15 +150,17 @@ def refine_view(
             stack = build_inputs(tensors, network.config)
             outputs = _run_tiled(stack, network, config).to(device)[None]
             refined = (tensors.inverse_depth + outputs[:, :1]).clamp(low, high)
+            error = outputs[:, 1:2] if network.config.confidence else None
+            if config.follow_edges:
+                refined = follow_edges(refined, error, tensors)
             if config.keep_confirmed:
                 limit = least_change
-                if network.config.confidence:
-                    limit = torch.maximum(limit, num_errors * outputs[:, 1:2])
+                if error is not None:
+                    limit = torch.maximum(limit, num_errors * error)
                 is_kept = (refined - initial).abs() < limit
                 refined = torch.where(is_kept, initial, refined)
             tensors = tensors._replace(inverse_depth=refined)
-        if network.config.confidence:
-            error = outputs[:, 1:2]
+        if error is not None:
             confidence = 1.0 - torch.exp(-CONFIDENT_ERROR * refined / error)
         else:
             confidence = _correlation(tensors, network.config.num_sources)

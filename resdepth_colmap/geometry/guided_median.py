@@ -1,0 +1,97 @@
+"""Depth whose edges follow the photo's: a median weighted by likeness of colour.
+
+Ma et al., "Constant time weighted median filtering for stereo matching and beyond",
+ICCV 2013: beside an edge of depth the pixels of the same colour belong to the same
+surface. Compiled by numba: sorting windows of 49 takes torch ten times as long.
+"""
+
+import cv2
+import numpy as np
+from numba import njit, prange
+
+from resdepth_colmap.scene import FloatMap, UnitColors
+
+STEP_PX, NUM_STEPS = 3, 3
+RADIUS_PX = STEP_PX * NUM_STEPS
+"""The median is over every third pixel of a window of 19 x 19."""
+
+EDGE_RATIO = 1.05
+"""Where all of a window lies within this ratio there is no edge: nothing changes."""
+
+COLOR_SPREAD = 0.05
+"""Standard deviation of the difference, per channel, of colours of one surface."""
+
+_NUM_SAMPLES = (2 * NUM_STEPS + 1) ** 2
+
+
+def guided_median(
+    inverse_depth: FloatMap, colors: UnitColors, weights: FloatMap
+) -> FloatMap:
+    """Median of what surrounds each pixel near an edge and looks like it.
+
+    Args:
+        inverse_depth: Shape (H, W), float32, > 0, in 1/unit.
+        colors: The photo, shape (H, W, C), in 0..1.
+        weights: How much each pixel is to be trusted, shape (H, W), > 0.
+
+    Returns:
+        Inverse depth, shape (H, W), float32; each value is one of the input's.
+    """
+    window = np.ones((2 * RADIUS_PX + 1, 2 * RADIUS_PX + 1), np.uint8)
+    values = np.ascontiguousarray(inverse_depth, np.float32)
+    is_edge = cv2.dilate(values, window) > EDGE_RATIO * cv2.erode(values, window)
+    result = values.copy()
+    spread = COLOR_SPREAD * np.sqrt(2.0 * colors.shape[2])
+    photo = np.ascontiguousarray(colors / spread, np.float32)
+    _medians(values, photo, weights.astype(np.float32), is_edge, result)
+    return result
+
+
+# mypy: disable-error-code="no-untyped-def"
+
+
+@njit(cache=True, fastmath=True, parallel=True)
+def _medians(values, colors, weights, is_edge, result):
+    height, width = values.shape
+    for row in prange(height):
+        window = np.empty((2, _NUM_SAMPLES), np.float32)  # values, sorted; weights
+        for column in range(width):
+            if is_edge[row, column]:
+                count = _gather(values, colors, weights, row, column, window)
+                result[row, column] = _median(window[:, :count])
+
+
+@njit(cache=True, fastmath=True)
+def _gather(values, colors, weights, row, column, window):
+    height, width = values.shape
+    count = 0
+    for y in range(row - RADIUS_PX, row + RADIUS_PX + 1, STEP_PX):
+        for x in range(column - RADIUS_PX, column + RADIUS_PX + 1, STEP_PX):
+            if 0 <= y < height and 0 <= x < width:
+                distance = np.float32(0.0)
+                for channel in range(colors.shape[2]):
+                    step = colors[y, x, channel] - colors[row, column, channel]
+                    distance += step * step
+                weight = np.exp(-distance) * weights[y, x]
+                _insert(window, count, values[y, x], weight)
+                count += 1
+    return count
+
+
+@njit(cache=True, fastmath=True)
+def _insert(window, count, value, weight):
+    place = count
+    while place > 0 and window[0, place - 1] > value:
+        window[0, place] = window[0, place - 1]
+        window[1, place] = window[1, place - 1]
+        place -= 1
+    window[0, place], window[1, place] = value, weight
+
+
+@njit(cache=True, fastmath=True)
+def _median(window):
+    half, below, place = 0.5 * window[1].sum(), np.float32(0.0), 0
+    while below + window[1, place] < half:
+        below += window[1, place]
+        place += 1
+    return window[0, place]
