@@ -1,12 +1,14 @@
 """Measure the network on rendered rooms that it was not trained on.
 
-    python scripts/bench_held_out.py [--rooms build/held_out] [OPTIONS OF
-        `resdepth-colmap evaluate depth`]
+    python scripts/bench_held_out.py [--rooms build/held_out] [--like-colmap] [OPTIONS
+        OF `resdepth-colmap evaluate depth`]
 
 Rooms of `make_training_data.py` whose seeds no training has used, matched in both
-passes. Rooms that are there are kept. The figures go to
-docs/measurements/held_out.json unless --output names another file; then
-`python scripts/make_tables.py` puts them into the documents.
+passes. Rooms that are there are kept. The figures go to docs/measurements/held_out.json
+unless --output names another file; then `python scripts/make_tables.py` puts them into
+the documents. With --like-colmap the same rooms are matched in one pass without
+smoothness, which leaves maps more like COLMAP's unfiltered ones; that goes to
+held_out_rough.json.
 """
 
 import argparse
@@ -17,21 +19,42 @@ from pathlib import Path
 from resdepth_colmap.cli.main import main
 
 REPOSITORY = Path(__file__).resolve().parents[1]
-RESULT = REPOSITORY / "docs" / "measurements" / "held_out.json"
+MEASUREMENTS = REPOSITORY / "docs" / "measurements"
 FIRST_SEED = 9000
 NUM_ROOMS = 20
+PARTS = ("sparse", "images", "ground_truth")
+LIKE_COLMAP = ("--smoothness", "0", "--no-geom-consistency")
 
 
 def run() -> None:
     """Make the rooms and run the command; the last --output wins."""
     parser = argparse.ArgumentParser(description=__doc__, add_help=False)
     parser.add_argument("--rooms", type=Path, default=REPOSITORY / "build" / "held_out")
+    parser.add_argument("--like-colmap", action="store_true")
     arguments, options = parser.parse_known_args()
+    rooms: Path = arguments.rooms
     maker = [sys.executable, str(REPOSITORY / "scripts" / "make_training_data.py")]
     seeds = ["--first-seed", str(FIRST_SEED), "--num-scenes", str(NUM_ROOMS)]
-    subprocess.run([*maker, str(arguments.rooms), *seeds], check=True)
-    command = ["evaluate", "depth", str(arguments.rooms), "--output", str(RESULT)]
-    main([*command, *options], prog_name="resdepth-colmap")
+    subprocess.run([*maker, str(rooms), *seeds], check=True)
+    name = "held_out"
+    if arguments.like_colmap:
+        rooms, name = without_maps(rooms), "held_out_rough"
+        options = [*LIKE_COLMAP, *options]
+    command = ["evaluate", "depth", str(rooms)]
+    command += ["--output", str(MEASUREMENTS / f"{name}.json"), *options]
+    main(command, prog_name="resdepth-colmap")
+
+
+def without_maps(rooms: Path) -> Path:
+    """A folder beside the rooms with the same rooms, but no depth maps."""
+    folder = rooms.absolute().with_name(f"{rooms.name}_unmatched")
+    for room in sorted(rooms.absolute().glob("room_*")):
+        for part in PARTS:
+            link = folder / room.name / part
+            if not link.is_symlink():
+                link.parent.mkdir(parents=True, exist_ok=True)
+                link.symlink_to(room / part, target_is_directory=True)
+    return folder
 
 
 if __name__ == "__main__":

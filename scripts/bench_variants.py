@@ -150,31 +150,38 @@ def refined_copies(
             path = copy.workspace.depth_map_path(view.image_name, REFINED_KIND)
             loaded = None if path.exists() else view.load(network.config.num_sources)
             if loaded is not None:
-                write_depth_map(path, refined_by([network], loaded.inputs))
+                write_depth_map(path, Arm([network]).refined(loaded.inputs))
             elif not path.exists():  # of a failed pair: no training takes it
                 link_or_copy(view.map_path, path)
         copies.append(copy.path)
     return copies
 
 
-def refined_by(networks: Sequence[ResDepthNet], view: ViewInputs) -> DepthMap:
-    """Depth after one network after the other; each warps with what it gets."""
-    for network in networks:
-        depth = refine_view(view, network, REFINING).depth
-        view = dataclasses.replace(view, depth=depth)
-    return view.depth
+class Arm(NamedTuple):
+    """Networks that are applied one after the other, and how."""
+
+    networks: Sequence[ResDepthNet]
+    config: RefineConfig = REFINING
+
+    def refined(self, view: ViewInputs) -> DepthMap:
+        """Depth after the last network; each warps with what it gets."""
+        for network in self.networks:
+            depth = refine_view(view, network, self.config).depth
+            view = dataclasses.replace(view, depth=depth)
+        return view.depth
 
 
-def measure(
-    scenes: Sequence[Path], arms: Mapping[str, Sequence[ResDepthNet]]
-) -> dict[str, Any]:
+Arms = dict[str, Arm]
+
+
+def measure(scenes: Sequence[Path], arms: Arms) -> dict[str, Any]:
     """Errors of each arm on each view, and their means."""
     errors = {}
     for view in (view for scene in scenes for view in labelled_views(scene)):
         loaded = view.load(num_sources=1)
         if loaded is None:
             continue
-        refined = {key: refined_by(nets, loaded.inputs) for key, nets in arms.items()}
+        refined = {key: arm.refined(loaded.inputs) for key, arm in arms.items()}
         errors[view.name] = arm_errors(loaded.inputs.depth, refined, loaded.truth)
     return {
         "num_scenes": len(scenes),
@@ -183,31 +190,32 @@ def measure(
     }
 
 
-Arms = dict[str, list[ResDepthNet]]
-"""By name the networks that are applied one after the other."""
-
-
 def paper_arms(trainer: Trainer) -> Arms:
     """The paper's variants."""
     suffix = trainer.budget.network.normalisation
-    arms = {name: [trainer.network(f"{name}-{suffix}", PAPER[name])] for name in PAPER}
-    (stereo,) = arms[STEREO]
+    arms = {
+        name: Arm([trainer.network(f"{name}-{suffix}", PAPER[name])]) for name in PAPER
+    }
+    (stereo,) = arms[STEREO].networks
     folder = trainer.work / f"refined_scenes-{suffix}"
     trainer = trainer._replace(scenes=refined_copies(trainer.scenes, stereo, folder))
     again = trainer.network(f"{ITERATED}-{suffix}", PAPER[STEREO])
-    return {**arms, ITERATED: [stereo, again]}
+    return {**arms, ITERATED: Arm([stereo, again])}
 
 
 def beyond_arms(trainer: Trainer) -> Arms:
-    """ResDepth-stereo, what is added to it, and what two passes add to that."""
+    """ResDepth-stereo, what is added to it; what two passes or the edges add then."""
     arms: Arms = {}
     options = Options()
     for name, more in ADDITIONS.items():
         options = Options(
             {**options.network, **more.network}, {**options.training, **more.training}
         )
-        arms[name] = [trainer.network(FOLDERS.get(name, name), options)]
-    arms["two_passes"] = 2 * arms[name]
+        network = trainer.network(FOLDERS.get(name, name), options)
+        arms[name] = Arm([network])
+    arms["two_passes"] = Arm([network, network])
+    following = dataclasses.replace(REFINING, follow_edges=True)
+    arms["follow_edges"] = Arm([network], following)
     return arms
 
 

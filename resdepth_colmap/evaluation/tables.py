@@ -142,6 +142,7 @@ DOCUMENTS: dict[str, dict[str, Renderer]] = {
         "middlebury": middlebury_table,
         "middlebury_completed": middlebury_summary,
         "held_out": middlebury_summary,
+        "held_out_rough": middlebury_summary,
         "agreement": agreement_table,
         "workspaces": workspaces_table,
         "refine": refine_table,
