@@ -16,6 +16,8 @@ CHANNELS = {
     "photo_consistency": "how well the two photos agree (7 x 7 correlation)",
     "carried_change": "where the depth maps of other views differ",
     "carried": "where any of these says something",
+    "red": "the photo's red",
+    "blue": "and blue",
 }
 
 
