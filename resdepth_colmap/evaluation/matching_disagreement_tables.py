@@ -31,6 +31,25 @@ QUESTIONS = {
 SHARES = ("share", "ours_confirmed", "alike", "near_step")
 
 
+def chance_parts(part: Measured) -> list[str]:
+    """Where confirmed pixels lie side by side, where alone, and what chance does."""
+    keys = ("dense", "agree_dense", "agree_sparse", "chance")
+    rows = [
+        [name, *[percent(entry[key]) for key in keys]]
+        for name, entry in {**part["maps"], "**mean**": part["mean"]}.items()
+    ]
+    return [
+        "The confirmed pixels of `meeting_room` by what surrounds them: dense ones, "
+        "around which at least half of the 5 x 5 pixels are confirmed too, and sparse "
+        "ones; on how many of either we agree within 2 %; and as many as how many of "
+        "the sparse ones would be confirmed if the depth of COLMAP's map there were "
+        "wrong by 5 or 10 %:",
+        markdown_table(
+            "image | dense | dense: agree | sparse: agree | sparse: by chance", rows
+        ),
+    ]
+
+
 def more_sources_parts(part: Measured) -> list[str]:
     """The images that agree least, before and after."""
     number_of, rows = part["num_sources"], []

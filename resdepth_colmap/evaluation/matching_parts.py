@@ -17,6 +17,7 @@ from resdepth_colmap.evaluation.matched_workspace import (
     copied_maps,
     matched_workspace,
 )
+from resdepth_colmap.evaluation.matching_chance import measure_chance
 from resdepth_colmap.evaluation.matching_disagreement import measure_disagreement
 from resdepth_colmap.evaluation.matching_from_theirs import measure_from_theirs
 from resdepth_colmap.evaluation.matching_meeting_room import measure_meeting_room
@@ -178,6 +179,7 @@ def fused_scores(filtered: MatchedWorkspace) -> Result:
 
 PARTS: dict[str, Callable[[Folders], Result]] = {
     "meeting_room": measure_meeting_room,
+    "chance": measure_chance,
     "more_sources": measure_more_sources,
     "disagreement": measure_disagreement,
     "from_theirs": measure_from_theirs,

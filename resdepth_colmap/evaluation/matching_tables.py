@@ -12,6 +12,7 @@ from resdepth_colmap.evaluation.markdown import (
     percent,
 )
 from resdepth_colmap.evaluation.matching_disagreement_tables import (
+    chance_parts,
     disagreement_parts,
     from_theirs_parts,
     more_sources_parts,
@@ -224,6 +225,7 @@ def _seconds_sentence(part: Measured) -> str:
 
 PARTS = {
     "meeting_room": _meeting_room,
+    "chance": chance_parts,
     "more_sources": more_sources_parts,
     "disagreement": disagreement_parts,
     "from_theirs": from_theirs_parts,

@@ -75,6 +75,11 @@ def disagreement() -> dict[str, Any]:
     return {"num_asked": 1000, "margin": 0.05, "maps": maps, "mean": entry}
 
 
+def chance() -> dict[str, Any]:
+    entry = {"dense": 0.75, "agree_dense": 0.875, "agree_sparse": 0.5, "chance": 0.25}
+    return {"maps": {"a.jpg": entry}, "mean": entry}
+
+
 def from_theirs() -> dict[str, Any]:
     entry = {"before": 0.5, "after": 0.75, "stay": 0.25, "return": 0.625}
     return {"num_rows": 120, "maps": {"a.jpg": entry}, "mean": entry}
@@ -87,6 +92,7 @@ def measured() -> dict[str, Any]:
         "command": "python bench.py",
         "date": "2026-01-02",
         "meeting_room": part(mean_twice=MAPS, chance=0.125),
+        "chance": chance(),
         "more_sources": more_sources(),
         "disagreement": disagreement(),
         "from_theirs": from_theirs(),
@@ -100,7 +106,7 @@ def measured() -> dict[str, Any]:
 def test_every_table_is_whole() -> None:
     text = matching_table(measured())
     tables = [block for block in text.split("\n\n") if block.startswith("|")]
-    assert len(tables) == 12
+    assert len(tables) == 13
     for table in tables:
         assert len({line.count("|") for line in table.splitlines()}) == 1
 
@@ -168,3 +174,8 @@ def test_where_the_matcher_goes_from_their_map_is_told() -> None:
 def test_what_was_not_measured_is_left_out() -> None:
     text = matching_table({"command": "x", "date": "2026-01-02"})
     assert "|" not in text
+
+
+def test_chance_is_told_beside_agreement() -> None:
+    text = matching_table(measured())
+    assert "| **mean** | 75.0 % | 87.5 % | 50.0 % | 25.0 % |" in text
