@@ -192,8 +192,8 @@ class RefineConfig(Config):
             that is the word before ".bin" in its file name.
         passes: How often to warp and refine (the paper's iter: 2).
         keep_confirmed: Keep the initial depth of a pixel where another view's map or
-            the photographs confirm it and the network changes it only a little, or by
-            less than the error that it expects to make.
+            the photographs confirm it and the network changes it only a little, or
+            little beside the error that it expects to make.
         follow_edges: Move edges of the depth to those of the photo: a median over what
             has a pixel's colour.
         tile_px: Side of a square tile, in pixels.

@@ -11,12 +11,12 @@ KEPT_CONSISTENCY = 0.15
 FILTERED_SHARE = 0.95
 """A map with less of its pixels filled has been filtered."""
 
-KEPT_CHANGE = 0.05
+KEPT_CHANGE = 0.03
 """Relative change that is no correction of an outlier: a confirmed depth stays."""
 
-CONFIRMED_ERRORS = 2.0
+CONFIRMED_ERRORS, OTHER_ERRORS = 1.5, 0.5
 """What another view's map confirms stays unless it is changed by so many times the
-error that the network expects of its result; anything else, by once that."""
+error that the network expects of its result; and so does anything else."""
 
 
 def kept_change(tensors: ViewTensors) -> Tensor:
@@ -49,8 +49,8 @@ def kept_change(tensors: ViewTensors) -> Tensor:
 def kept_errors(tensors: ViewTensors) -> Tensor:
     """The expected errors below which a change is none, shape (B, 1, H, W) or ()."""
     if tensors.confirmed is None:
-        return torch.tensor(1.0, device=tensors.valid.device)
-    return torch.where(tensors.confirmed, CONFIRMED_ERRORS, 1.0)
+        return torch.tensor(OTHER_ERRORS, device=tensors.valid.device)
+    return torch.where(tensors.confirmed, CONFIRMED_ERRORS, OTHER_ERRORS)
 
 
 def is_filtered(valid: Tensor) -> bool:

@@ -123,7 +123,7 @@ def refine_view(
     what the network says are moved to those of the photo (docs/adr/0014). A measured
     depth that a map of another view confirms is kept, and one that the photographs
     confirm, where the network would change it only a little: matching is more exact
-    there than the network. Nor is a change taken that is smaller than the error that
+    there than the network. Nor is a change taken that is small beside the error that
     the network itself expects (docs/adr/0006 and 0012).
 
     Args:
