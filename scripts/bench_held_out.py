@@ -12,18 +12,20 @@ held_out_rough.json.
 """
 
 import argparse
+import dataclasses
 import subprocess
 import sys
 from pathlib import Path
 
 from resdepth_colmap.cli.main import main
+from resdepth_colmap.evaluation.matched_workspace import matched_workspace
+from resdepth_colmap.evaluation.matching_passes import AUTO, FIRST
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 MEASUREMENTS = REPOSITORY / "docs" / "measurements"
 FIRST_SEED = 9000
 NUM_ROOMS = 20
-PARTS = ("sparse", "images", "ground_truth")
-LIKE_COLMAP = ("--smoothness", "0", "--no-geom-consistency")
+LIKE_COLMAP = dataclasses.replace(FIRST, smoothness=0.0)
 
 
 def run() -> None:
@@ -38,22 +40,19 @@ def run() -> None:
     subprocess.run([*maker, str(rooms), *seeds], check=True)
     name = "held_out"
     if arguments.like_colmap:
-        rooms, name = without_maps(rooms), "held_out_rough"
-        options = [*LIKE_COLMAP, *options]
+        rooms, name = matched_like_colmap(rooms), "held_out_rough"
     command = ["evaluate", "depth", str(rooms)]
     command += ["--output", str(MEASUREMENTS / f"{name}.json"), *options]
     main(command, prog_name="resdepth-colmap")
 
 
-def without_maps(rooms: Path) -> Path:
-    """A folder beside the rooms with the same rooms, but no depth maps."""
-    folder = rooms.absolute().with_name(f"{rooms.name}_unmatched")
-    for room in sorted(rooms.absolute().glob("room_*")):
-        for part in PARTS:
-            link = folder / room.name / part
-            if not link.is_symlink():
-                link.parent.mkdir(parents=True, exist_ok=True)
-                link.symlink_to(room / part, target_is_directory=True)
+def matched_like_colmap(rooms: Path) -> Path:
+    """A folder beside the rooms: the same, but with maps like COLMAP's unfiltered."""
+    folder = rooms.with_name(f"{rooms.name}_like_colmap")
+    for room in sorted(rooms.glob("room_*")):
+        copy = matched_workspace(room, folder / room.name)
+        images = {view.name: AUTO for view in copy.scene.views}
+        copy.match("photometric", images, LIKE_COLMAP)
     return folder
 
 

@@ -43,7 +43,7 @@ class NetworkConfig(Config):
         photo_consistency: Give it the local correlation of reference and warped view.
         source_depth: Compare its input with the depth maps of other views, which
             complete it, and give it where they differ and where nothing arrives.
-        color: Give it the reference in colour, which tells edges that grey does not.
+        color: Give it the reference in colour. It helped no depth (docs/benchmarks.md).
         gate: Let it weigh its residual by a learned gate in 0..1.
         last_block: One more convolution block at full resolution, before the last
             convolution: lets it weigh fine structure by what surrounds it.
@@ -59,7 +59,7 @@ class NetworkConfig(Config):
     valid: bool = True
     photo_consistency: bool = True
     source_depth: bool = True
-    color: bool = True
+    color: bool = False
     gate: bool = True
     last_block: bool = True
     confidence: bool = True
@@ -92,7 +92,6 @@ class NetworkConfig(Config):
             last_block=False,
             photo_consistency=False,
             source_depth=False,
-            color=False,
             confidence=False,
             normalisation=Normalisation.BASELINE,
         )

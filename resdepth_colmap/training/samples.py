@@ -58,7 +58,7 @@ class Sample(NamedTuple):
 
 def guidance_names(num_sources: int) -> tuple[str, ...]:
     """Names of the channels in a sample, in order."""
-    return NetworkConfig(num_sources=num_sources).channels[1:]
+    return _all_channels(num_sources).channels[1:]
 
 
 def prepare_samples(
@@ -100,7 +100,7 @@ def prepare_samples(
 def build_sample(loaded: Loaded, num_sources: int, use_maps: bool = True) -> Sample:
     """The sample of a view, with or without a look at the maps of other views."""
     tensors = view_tensors(loaded.inputs, torch.device("cpu"), use_maps)
-    stack = build_inputs(tensors, NetworkConfig(num_sources=num_sources))
+    stack = build_inputs(tensors, _all_channels(num_sources))
     alone = build_inputs(tensors._replace(sources=()), NetworkConfig())
     known = loaded.truth > 0
     target = np.where(known, 1.0 / np.where(known, loaded.truth, 1.0), 0.0)
@@ -112,6 +112,10 @@ def build_sample(loaded: Loaded, num_sources: int, use_maps: bool = True) -> Sam
         guidance=stack.guidance[0].half().numpy(),
         baseline=np.array(baselines, np.float32),
     )
+
+
+def _all_channels(num_sources: int) -> NetworkConfig:
+    return NetworkConfig(num_sources=num_sources, color=True)
 
 
 def read_sample(path: Path) -> Sample:

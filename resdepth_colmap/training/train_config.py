@@ -82,7 +82,7 @@ class TrainConfig(Config):
     optimiser: Optimiser = Optimiser.ADAMW
     schedule: Schedule = Schedule.ONE_CYCLE
     largest_gradient: float = 1.0
-    distance_power: float = 1.5
+    distance_power: float = 1.0
     valid_importance: float = 0.3
     log_weight: float = 0.1
     confidence_weight: float = 0.05

@@ -17,7 +17,7 @@ from resdepth_colmap.training import crops
 from resdepth_colmap.training.crops import CropSampler
 from resdepth_colmap.training.samples import prepare_samples, read_sample
 
-NETWORK = NetworkConfig(levels=3, base_channels=4, max_channels=8)
+NETWORK = NetworkConfig(levels=3, base_channels=4, max_channels=8, color=True)
 
 
 @pytest.fixture(scope="module")
