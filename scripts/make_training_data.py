@@ -60,6 +60,8 @@ def main() -> None:
         make = partial(make_room, arguments.output)
         for line in pool.imap_unordered(make, seeds):
             print(line, flush=True)
+        pool.close()  # or else they are killed, and pycolmap prints where it was
+        pool.join()
 
 
 if __name__ == "__main__":
