@@ -10,7 +10,10 @@ import cv2
 import numpy as np
 from numba import njit, prange
 
+from resdepth_colmap.geometry.threading_layer import prefer_openmp
 from resdepth_colmap.scene import FloatMap, UnitColors
+
+prefer_openmp()
 
 STEP_PX, NUM_STEPS = 3, 3
 RADIUS_PX = STEP_PX * NUM_STEPS

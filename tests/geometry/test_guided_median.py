@@ -1,5 +1,8 @@
 """Laws of the median that the photo guides."""
 
+import subprocess
+import sys
+
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -80,3 +83,21 @@ def test_the_unit_of_length_does_not_matter() -> None:
     found = guided_median(depth, photo(30), ONES)
     assert np.array_equal(guided_median(depth * 64, photo(30), ONES), found * 64)
     assert (found != depth).any()
+
+
+def test_the_old_tbb_of_open3d_is_nothing_to_warn_of() -> None:
+    code = """
+import warnings
+import open3d
+from numba.core.errors import NumbaWarning
+import subprocess
+import sys
+
+import numpy as np
+from resdepth_colmap.geometry.guided_median import guided_median
+warnings.simplefilter("error", NumbaWarning)
+depth = np.ones((8, 8), np.float32)
+depth[:, :4] = 0.5
+guided_median(depth, np.zeros((8, 8, 3), np.float32), depth)
+"""
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=120)
