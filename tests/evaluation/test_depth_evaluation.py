@@ -35,7 +35,8 @@ FAST = StereoConfig(num_iterations=3, window_radius=3)
 
 
 def options(tmp_path: Path, cache: MatchCache | None = None) -> EvaluationOptions:
-    refine = RefineConfig(passes=2, weights=identity_weights(tmp_path))
+    weights = identity_weights(tmp_path)
+    refine = RefineConfig(passes=2, weights=weights, follow_edges=False)
     return EvaluationOptions(refine=refine, stereo=FAST, cache=cache)
 
 
