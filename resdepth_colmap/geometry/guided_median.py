@@ -90,6 +90,7 @@ def _median(found, shares):
     # Halving the range takes 0.6 of the time of sorting: it runs on vectors.
     half = np.float32(0.5) * shares.sum()
     low, high = found.min(), found.max()
+    median = high
     if _share_up_to(low, found, shares) >= half:
         return low
     for _ in range(NUM_HALVINGS):
@@ -98,7 +99,6 @@ def _median(found, shares):
             high = middle
         else:
             low = middle
-    median = np.float32(np.inf)
     for index in range(found.size):
         if low < found[index] < median:
             median = found[index]
