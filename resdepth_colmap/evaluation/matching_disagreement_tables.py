@@ -41,9 +41,9 @@ def chance_parts(part: Measured) -> list[str]:
     return [
         "The confirmed pixels of `meeting_room` by what surrounds them: dense ones, "
         "around which at least half of the 5 x 5 pixels are confirmed too, and sparse "
-        "ones; on how many of either we agree within 2 %; and as many as how many of "
-        "the sparse ones would be confirmed if the depth of COLMAP's map there were "
-        "wrong by 5 or 10 %:",
+        "ones; on how many of either we agree within 2 %; and how many pixels outside "
+        "of the dense areas would be confirmed if COLMAP's depth there were wrong by 5 "
+        "or 10 %, over the number of the sparse ones:",
         markdown_table(
             "image | dense | dense: agree | sparse: agree | sparse: by chance", rows
         ),
