@@ -25,10 +25,6 @@ from resdepth_colmap.training.samples import (
     sample_size,
 )
 
-DISTANCE_RATIOS = (0.3, 3.0)
-"""Range of the true depth, over the tile's, that errors are weighed by."""
-
-
 ALONE_SHARE = 0.15
 """Share of crops of a network that looks at the maps of other views for which there are
 none: users may have none."""
@@ -41,8 +37,8 @@ class Batch(NamedTuple):
         inputs: The network's input, shape (B, C, H, W).
         target: True inverse depth, normalised as the input is, shape (B, 1, H, W).
         known: Where there is truth, shape (B, 1, H, W), bool.
-        weight: What turns an error of each pixel into the one that counts, shape (B, 1,
-            H, W).
+        spread: What a normalised inverse depth of 1 is over one of 0, less 1: their
+            ratio to the tile's offset is 1 + spread * x, shape (B, 1, 1, 1).
         importance: How much each pixel counts, shape (B, 1, H, W), 1 in the mean.
         names: Names of the samples of all processes, for the message when a loss is
             not a number.
@@ -51,7 +47,7 @@ class Batch(NamedTuple):
     inputs: Tensor
     target: Tensor
     known: Tensor
-    weight: Tensor
+    spread: Tensor
     importance: Tensor
     names: tuple[str, ...]
 
@@ -61,7 +57,7 @@ class Batch(NamedTuple):
             inputs=self.inputs.to(device),
             target=self.target.to(device),
             known=self.known.to(device),
-            weight=self.weight.to(device),
+            spread=self.spread.to(device),
             importance=self.importance.to(device),
             names=self.names,
         )
@@ -79,7 +75,6 @@ class CropSampler:
         seed: Seed of all choices.
         holes_share: Share of samples whose maps have holes.
         vary_light: Change brightness and contrast at random.
-        distance_power: Errors are weighed by the true depth to this power.
         valid_importance: How much a pixel of a valid depth counts, to one without.
     """
 
@@ -90,7 +85,6 @@ class CropSampler:
     seed: int
     holes_share: float = 0.2
     vary_light: bool = True
-    distance_power: float = 1.0
     valid_importance: float = 1.0
 
     def batch(self, step: int, rank: int = 0, num_ranks: int = 1) -> Batch:
@@ -118,13 +112,11 @@ class CropSampler:
         inputs, scaling = network_input(stack, self.config)
         target = _stacked([crop.target[None] for crop in crops])
         known = target > 0
-        distance = scaling.offset / torch.where(known, target, scaling.offset)
-        weight = distance.clamp(*DISTANCE_RATIOS) ** self.distance_power
         return Batch(
             inputs=inputs,
             target=scaling.normalise(target),
             known=known,
-            weight=weight,
+            spread=scaling.scale / scaling.offset,
             importance=self._importance(stack.valid),
             names=tuple(path.stem for path, _ in draws),
         )

@@ -89,7 +89,6 @@ def prepare_data(
             holes_share=config.holes_share,
             valid_importance=config.valid_importance,
             vary_light=config.vary_light,
-            distance_power=config.distance_power,
         )
         for paths in ranks.from_first(make)
     )

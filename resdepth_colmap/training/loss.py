@@ -16,6 +16,10 @@ LARGEST_ERROR = 8.0
 """Beyond it an error says no more about the scale that the confidence should have."""
 
 
+DISTANCE_RATIOS = (0.25, 3.0)
+"""Range of the refined depth, over the tile's, that errors are weighed by."""
+
+
 class LossSum(NamedTuple):
     """A loss that can be added over processes; the loss is `total / num_known`.
 
@@ -36,6 +40,10 @@ def refinement_loss(refined: Refinement, batch: Batch, config: TrainConfig) -> L
     steeply near zero, so that pixels that were right stay right. The predicted scale is
     that of a Laplace distribution; its gradient does not reach the depth.
 
+    Errors are weighed by the refined depth, not by the true one: a pixel that may be of
+    either of two surfaces then goes to the likelier, while weights that grow with the
+    truth would draw it to the farther (docs/adr/0015).
+
     Args:
         refined: The network's output, normalised.
         batch: Truth and weights, normalised alike.
@@ -44,7 +52,7 @@ def refinement_loss(refined: Refinement, batch: Batch, config: TrainConfig) -> L
     known = batch.known.to(batch.target.dtype)
     truth = torch.where(batch.known, batch.target, 0.0)
     distance = (refined.inverse_depth - truth).abs()
-    error = distance * batch.weight
+    error = distance * _distance_weight(refined, batch, config.distance_power)
     value = error
     if config.log_weight:
         value = value + config.log_weight * torch.log1p(error / SMALL_ERROR)
@@ -54,3 +62,10 @@ def refinement_loss(refined: Refinement, batch: Batch, config: TrainConfig) -> L
         likelihood = seen * torch.exp(-log_scale) + log_scale
         value = value + config.confidence_weight * likelihood
     return LossSum((value * known * batch.importance).sum(), known.sum())
+
+
+def _distance_weight(refined: Refinement, batch: Batch, power: float) -> Tensor:
+    """The refined depth over the tile's, to a power; no gradient goes through it."""
+    near, far = DISTANCE_RATIOS
+    inverse_ratio = 1.0 + batch.spread * refined.inverse_depth.detach()
+    return inverse_ratio.clamp(1.0 / far, 1.0 / near) ** -power

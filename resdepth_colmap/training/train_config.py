@@ -49,8 +49,9 @@ class TrainConfig(Config):
         optimiser: adam (the paper's) or adamw.
         schedule: Of the learning rate.
         largest_gradient: Norm that gradients are cut to; 0 = they are not.
-        distance_power: Weigh errors of inverse depth by the true depth to this power:
-            1 = relative errors count, 2 = errors in units of length, 0 = the paper's.
+        distance_power: Weigh errors of inverse depth by the refined depth to this
+            power: 2 = errors in units of length count, 1 = relative ones, 0 = the
+            paper's.
         valid_importance: How much a pixel counts whose depth was measured (and
             confirmed by another map), to one that was filled in: the rule that keeps
             what is confirmed looks after the former.
@@ -82,7 +83,7 @@ class TrainConfig(Config):
     optimiser: Optimiser = Optimiser.ADAMW
     schedule: Schedule = Schedule.ONE_CYCLE
     largest_gradient: float = 1.0
-    distance_power: float = 1.0
+    distance_power: float = 2.0
     valid_importance: float = 0.3
     log_weight: float = 0.1
     confidence_weight: float = 0.05

@@ -25,7 +25,7 @@ def batch() -> Batch:
         inputs=torch.zeros(SHAPE),
         target=random(0),
         known=random(1) > 0,
-        weight=random(2).abs() + 0.3,
+        spread=torch.tensor([0.2, 0.4])[:, None, None, None],
         importance=torch.ones(SHAPE),
         names=("a", "b"),
     )
@@ -36,7 +36,6 @@ def refined_of(depth: Tensor, log_scale: Tensor | None = None) -> Refinement:
 
 
 def test_the_papers_loss_is_the_mean_absolute_error(batch: Batch) -> None:
-    batch = batch._replace(weight=torch.ones(SHAPE))
     depth = random(3)
     total, num_known = refinement_loss(refined_of(depth, random(4)), batch, PAPER)
     expected = (depth - batch.target).abs()[batch.known].mean()
@@ -95,6 +94,7 @@ def test_the_best_scale_is_the_error(batch: Batch) -> None:
 
 def test_the_logarithm_weighs_small_errors_more(batch: Batch) -> None:
     """Halving a small error gains more, by its size, than halving a large one."""
+    batch = batch._replace(spread=torch.zeros_like(batch.spread))
     plain = dataclasses.replace(DEFAULT, log_weight=0.0)
 
     def gain(error: float, config: TrainConfig) -> float:
@@ -116,3 +116,37 @@ def test_a_pixel_counts_as_much_as_it_is_important(batch: Batch) -> None:
         halves.append(refinement_loss(refined, important, DEFAULT).total)
     whole = refinement_loss(refined, batch, DEFAULT).total
     torch.testing.assert_close(halves[0] + halves[1], whole)
+
+
+@pytest.mark.parametrize("num_far", [1, 3, 5, 7])
+def test_a_pixel_of_two_surfaces_is_drawn_to_the_likelier(num_far: int) -> None:
+    """However much farther one of them is: the mean would be drawn to the farther."""
+    far, near = -2.0, 1.0
+    target = torch.tensor([far] * num_far + [near] * (8 - num_far))[None, None, None]
+    batch = Batch(
+        inputs=target,
+        target=target,
+        known=torch.ones_like(target, dtype=torch.bool),
+        spread=torch.full((1, 1, 1, 1), 0.3),
+        importance=torch.ones_like(target),
+        names=("a",),
+    )
+    between = torch.zeros_like(target).requires_grad_()
+    config = dataclasses.replace(DEFAULT, log_weight=0.0)
+    loss = refinement_loss(refined_of(between), batch, config)
+    loss.total.backward()  # type: ignore[no-untyped-call] # torch's own
+    assert between.grad is not None
+    assert (between.grad.sum() > 0) == (num_far > 4)
+
+
+def test_errors_count_in_units_of_length(batch: Batch) -> None:
+    """A small error of inverse depth, times the square of the depth."""
+    refined = random(6) * 0.5
+    depths = [1.0 / (1.0 + batch.spread * x) for x in (refined, refined + 1e-4)]
+    config = dataclasses.replace(DEFAULT, log_weight=0.0)
+    batch = batch._replace(target=refined + 1e-4)
+    loss = refinement_loss(refined_of(refined), batch, config)
+    lengths = (depths[0] - depths[1]).abs() / batch.spread
+    torch.testing.assert_close(
+        loss.total, lengths[batch.known].sum(), rtol=1e-2, atol=0.0
+    )
