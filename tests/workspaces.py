@@ -26,7 +26,9 @@ def identity_weights(path: Path, seed: int = 0, source_depth: bool = False) -> P
     in the file: its input is completed.
     """
     torch.manual_seed(seed)
-    config = NetworkConfig(levels=2, base_channels=4, source_depth=source_depth)
+    config = NetworkConfig(
+        levels=2, base_channels=4, source_depth=source_depth, propagation_channels=0
+    )
     network = ResDepthNet(config)
     file = path / f"{seed}-{source_depth}-{WEIGHTS_NAME}"
     save_weights(file, network)

@@ -33,13 +33,24 @@ def weights_table(measured: Mapping[str, Any]) -> str:
         f"{measured['megabytes']} MB; SHA-256 begins `{short_hash(measured)}`",
         "network": f"U-Net, {network['levels']} levels, {network['base_channels']} to "
         f"{network['max_channels']} channels, "
-        f"{measured['num_parameters'] / 1e6:.1f} million parameters",
+        f"{measured['num_parameters'] / 1e6:.1f} million parameters"
+        + _second_network(network),
         "inputs": "; ".join(inputs),
         "outputs": "; ".join(outputs),
         "normalisation": f"{network['normalisation']}, tile by tile",
     }
     return "\n".join(
         ["| | |", "|---|---|", *(f"| {k} | {v} |" for k, v in facts.items())]
+    )
+
+
+def _second_network(network: Mapping[str, Any]) -> str:
+    channels = network.get("propagation_channels", 0)
+    if not channels:
+        return ""
+    return (
+        f", those of a second, small one among them ({channels} channels at half the "
+        "resolution), which mixes each pixel's depth from those around it"
     )
 
 

@@ -43,11 +43,13 @@ class NetworkConfig(Config):
         photo_consistency: Give it the local correlation of reference and warped view.
         source_depth: Compare its input with the depth maps of other views, which
             complete it, and give it where they differ and where nothing arrives.
-        color: Give it the reference in colour. It helped no depth (docs/benchmarks.md).
+        color: Give it the reference in colour.
         gate: Let it weigh its residual by a learned gate in 0..1.
         last_block: One more convolution block at full resolution, before the last
             convolution: lets it weigh fine structure by what surrounds it.
         confidence: Let it predict the scale of its own error.
+        propagation_channels: Let a second, small network of so many channels mix each
+            pixel's depth from those around it (docs/adr/0015); 0 = none.
         normalisation: How inverse depth is scaled.
     """
 
@@ -59,10 +61,11 @@ class NetworkConfig(Config):
     valid: bool = True
     photo_consistency: bool = True
     source_depth: bool = True
-    color: bool = False
+    color: bool = True
     gate: bool = True
     last_block: bool = True
     confidence: bool = True
+    propagation_channels: int = 48
     normalisation: Normalisation = Normalisation.ROBUST
 
     def __post_init__(self) -> None:
@@ -80,6 +83,12 @@ class NetworkConfig(Config):
             max_channels=self.max_channels,
         )
         self._check(1 <= self.num_sources <= 8, "1 to 8", num_sources=self.num_sources)
+        self._check(
+            self.propagation_channels % 3 == 0
+            and 0 <= self.propagation_channels <= 384,
+            "a multiple of 3, 0 to 384",
+            propagation_channels=self.propagation_channels,
+        )
 
     @classmethod
     def paper(cls, variant: InputVariant = InputVariant.STEREO) -> Self:
@@ -92,7 +101,9 @@ class NetworkConfig(Config):
             last_block=False,
             photo_consistency=False,
             source_depth=False,
+            color=False,
             confidence=False,
+            propagation_channels=0,
             normalisation=Normalisation.BASELINE,
         )
 
@@ -105,6 +116,11 @@ class NetworkConfig(Config):
     def residual(self) -> bool:
         """Whether the output is added to the initial inverse depth."""
         return self.variant is not InputVariant.IMAGES_ONLY
+
+    @property
+    def propagates(self) -> bool:
+        """Whether a second network sharpens what the first one says."""
+        return self.propagation_channels > 0 and self.residual
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -123,6 +139,12 @@ class NetworkConfig(Config):
         if self.color and self.variant is not InputVariant.DEPTH_ONLY:
             names += [RED, BLUE]
         return tuple(names)
+
+    @property
+    def propagation_inputs(self) -> tuple[str, ...]:
+        """Names of what the second network sees, in order."""
+        said = ["refined", "log_scale"] if self.confidence else ["refined"]
+        return (*said, *self.channels)
 
     @property
     def multiple_px(self) -> int:

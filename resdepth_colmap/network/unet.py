@@ -5,10 +5,15 @@ from typing import NamedTuple, cast
 import torch
 from torch import Tensor, nn
 
+from resdepth_colmap.network.conv_block import conv_block
 from resdepth_colmap.network.network_config import NetworkConfig
+from resdepth_colmap.network.propagation import Propagation
 
 INPUT_LIMIT = 8.0
 """The convolutions see the normalised inverse depth clamped to plus or minus this."""
+
+LOG_SCALE_LIMITS = (-8.0, 4.0)
+"""The propagation sees the logarithm of the expected error clamped to these."""
 
 
 class Refinement(NamedTuple):
@@ -39,7 +44,8 @@ class ResDepthNet(nn.Module):
 
     The last convolution starts at zero, so that a fresh network returns its input depth
     exactly. PatchMatch's outliers are many times the spread of a tile: the convolutions
-    see channel 0 clamped to `INPUT_LIMIT`, the long residual adds it as it is.
+    see channel 0 clamped to `INPUT_LIMIT`, the long residual adds it as it is. What
+    comes out is sharpened by a `Propagation`, if `propagation_channels` says so.
     """
 
     def __init__(self, config: NetworkConfig) -> None:
@@ -57,26 +63,35 @@ class ResDepthNet(nn.Module):
         inputs = [len(config.channels), *widths[:-1]]
         outputs = [widths[0], *widths[:-1]]
         self.encoder = nn.ModuleList(
-            _conv_block(before, after)
+            conv_block(before, after)
             for before, after in zip(inputs, widths, strict=True)
         )
         self.pool = nn.MaxPool2d(kernel_size=2)
-        self.bottleneck = _conv_block(widths[-1], widths[-1])
+        self.bottleneck = conv_block(widths[-1], widths[-1])
         self.up = nn.ModuleList(
             nn.ConvTranspose2d(width, width, kernel_size=2, stride=2)
             for width in reversed(widths)
         )
         self.decoder = nn.ModuleList(
-            _conv_block(before, after)
+            conv_block(before, after)
             for before, after in zip(widths[:0:-1], outputs[:0:-1], strict=True)
         )
         self.last_block = (
-            _conv_block(widths[0], widths[0]) if config.last_block else nn.Identity()
+            conv_block(widths[0], widths[0]) if config.last_block else nn.Identity()
         )
         num_outputs = 1 + config.gate + config.confidence
         self.head = nn.Conv2d(widths[0], num_outputs, kernel_size=3, padding=1)
         nn.init.zeros_(self.head.weight)
         nn.init.zeros_(cast(Tensor, self.head.bias))
+        self.propagation = (
+            Propagation(
+                len(config.propagation_inputs),
+                config.propagation_channels,
+                config.levels,
+            )
+            if config.propagates
+            else None
+        )
 
     def forward(self, stack: Tensor) -> Refinement:
         """Refine a batch of tiles.
@@ -98,7 +113,23 @@ class ResDepthNet(nn.Module):
         if self.config.gate:
             residual = residual * torch.sigmoid(outputs[:, 1:2])
         refined = stack[:, :1] + residual if self.config.residual else residual
-        return Refinement(refined, outputs[:, -1:] if self.config.confidence else None)
+        log_scale = outputs[:, -1:] if self.config.confidence else None
+        return self._propagate(stack, Refinement(refined, log_scale))
+
+    def _propagate(self, stack: Tensor, before: Refinement) -> Refinement:
+        if self.propagation is None:
+            return before
+        seen = [before.inverse_depth.clamp(-INPUT_LIMIT, INPUT_LIMIT)]
+        if before.log_scale is not None:
+            seen.append(before.log_scale.clamp(*LOG_SCALE_LIMITS))
+        seen.append(self._squash(stack))
+        propagated = self.propagation(
+            torch.cat(seen, dim=1), before.inverse_depth, stack[:, :1]
+        )
+        log_scale = before.log_scale
+        if log_scale is not None:
+            log_scale = log_scale + propagated.log_scale_change
+        return Refinement(propagated.inverse_depth, log_scale)
 
     def _encode(self, features: Tensor) -> list[Tensor]:
         """Maps of all sizes, finest first; the bottleneck last."""
@@ -134,12 +165,3 @@ class ResDepthNet(nn.Module):
                 f"input of {width_px} x {height_px} px but {self.config.levels} levels "
                 f"need multiples of {multiple_px} px."
             )
-
-
-def _conv_block(before: int, after: int) -> nn.Sequential:
-    # No bias: the batch norm has one.
-    return nn.Sequential(
-        nn.Conv2d(before, after, kernel_size=3, padding=1, bias=False),
-        nn.BatchNorm2d(after),
-        nn.ReLU(inplace=True),
-    )

@@ -26,7 +26,7 @@ from resdepth_colmap.network.unet import ResDepthNet
 
 FORMAT = "resdepth-colmap"
 FORMAT_VERSION = 1
-_OLDER = {"source_depth": False}
+_OLDER = {"source_depth": False, "color": False, "propagation_channels": 0}
 """Options that the headers of older files do not name, as those networks were."""
 
 WAY_OUT = "use a file that `resdepth-colmap train` wrote, or leave out --weights"

@@ -17,7 +17,9 @@ SHIPPED = Path("shipped")
 """As the file to start from: the weights that come with the package."""
 
 _FIRST_KERNEL = "encoder.0.0.weight"
-_INPUTS = ("valid", "photo_consistency", "source_depth", "color")
+_PROPAGATION_KERNEL = "propagation.stem.0.0.weight"
+_MORE = ("valid", "photo_consistency", "source_depth", "color", "propagation_channels")
+"""What a network may have that the weights to start from have not."""
 
 
 def chosen_network(
@@ -61,20 +63,24 @@ def fresh_network(network_config: NetworkConfig, config: TrainConfig) -> ResDept
 
     Raises:
         WeightsError: If the weights to start from cannot be read.
-        ConfigError: If they are of another network. One that sees less will do: it
-            begins as blind to the new inputs as it was.
+        ConfigError: If they are of another network, or there is no propagation that
+            could be trained alone. One that sees less will do: it begins as blind to
+            the new inputs as it was; so will one without propagation.
     """
     torch.manual_seed(config.seed)
     network = ResDepthNet(network_config)
+    if config.freeze_unet and network.propagation is None:
+        raise ConfigError(
+            "freeze_unet: the network has no propagation, so nothing would be trained; "
+            "add propagation_channels, or leave freeze_unet out."
+        )
     if config.init is not None:
         path = _path(config.init)
         loaded = load_weights(path)
         _check_fits(path, loaded.config, network_config)
         weights = loaded.state_dict()
-        weights[_FIRST_KERNEL] = _widened(
-            weights[_FIRST_KERNEL], loaded.config, network_config
-        )
-        network.load_state_dict(weights)
+        _widen(weights, loaded.config, network_config)
+        network.load_state_dict({**network.state_dict(), **weights})
     return network
 
 
@@ -82,11 +88,25 @@ def _path(init: Path) -> Path:
     return default_weights_path() if init == SHIPPED else init
 
 
-def _widened(kernel: Tensor, theirs: NetworkConfig, ours: NetworkConfig) -> Tensor:
-    """The first convolution's kernel, with zeros for inputs that it did not see."""
-    wide = kernel.new_zeros(kernel.shape[0], len(ours.channels), *kernel.shape[2:])
-    for place, name in enumerate(theirs.channels):
-        wide[:, ours.channels.index(name)] = kernel[:, place]
+def _widen(
+    weights: dict[str, Tensor], theirs: NetworkConfig, ours: NetworkConfig
+) -> None:
+    """Give the first kernels zeros for the inputs that they did not see."""
+    names = {
+        _FIRST_KERNEL: (theirs.channels, ours.channels),
+        _PROPAGATION_KERNEL: (theirs.propagation_inputs, ours.propagation_inputs),
+    }
+    for key in names.keys() & weights.keys():
+        weights[key] = _widened(weights[key], *names[key])
+
+
+def _widened(kernel: Tensor, known: tuple[str, ...], all_: tuple[str, ...]) -> Tensor:
+    """Each name is one channel of the kernel, or as many as each of the others."""
+    group = kernel.shape[1] // len(known)
+    wide = kernel.new_zeros(kernel.shape[0], group * len(all_), *kernel.shape[2:])
+    for name, part in zip(known, kernel.split(group, dim=1), strict=True):  # type: ignore[no-untyped-call] # torch's own
+        place = all_.index(name) * group
+        wide[:, place : place + group] = part
     return wide
 
 
@@ -96,7 +116,7 @@ def _check_fits(path: Path, theirs: NetworkConfig, ours: NetworkConfig) -> None:
         f"{name} {other[name]}, not {wanted[name]}"
         for name in wanted
         if other[name] != wanted[name]
-        and not (name in _INPUTS and wanted[name])  # an input more
+        and not (name in _MORE and wanted[name] and not other[name])
     ]
     if differences:
         raise ConfigError(

@@ -50,6 +50,8 @@ class Optimisation:
     ) -> "Optimisation":
         """A training before its first step, on the device of this process."""
         network = network.to(ranks.device)
+        if config.freeze_unet:
+            _freeze_unet(network)
         model: nn.Module = network
         if ranks.count > 1:
             sync_norms(network)
@@ -58,7 +60,7 @@ class Optimisation:
             network = network.to(memory_format=torch.channels_last)  # type: ignore[call-overload] # torch's stubs lack the keyword
         kinds = {Optimiser.ADAM: torch.optim.Adam, Optimiser.ADAMW: torch.optim.AdamW}
         optimiser = kinds[config.optimiser](
-            network.parameters(),
+            [value for value in network.parameters() if value.requires_grad],
             lr=config.learning_rate,
             weight_decay=config.weight_decay,
         )
@@ -91,6 +93,8 @@ class Optimisation:
                 the running statistics of the norms.
         """
         self.model.train()
+        if self.config.freeze_unet:
+            _freeze_unet(self.network)
         batch = batch.to(self.ranks.device)
         inputs = batch.inputs.contiguous(memory_format=torch.channels_last)
         loss = refinement_loss(self._refined(inputs), batch, self.config)
@@ -124,6 +128,13 @@ class Optimisation:
             raise TrainingError(
                 f"the {what} is {value}; the batch: {', '.join(batch.names)}"
             )
+
+
+def _freeze_unet(network: ResDepthNet) -> None:
+    """No gradients but for the propagation, and no change of running statistics."""
+    for name, module in network.named_children():
+        if name != "propagation":
+            module.eval().requires_grad_(False)
 
 
 def _schedule(

@@ -71,6 +71,7 @@ class TrainConfig(Config):
         seed: Seed of weights, crops and order.
         init: Weights file to start from, with a fresh optimiser; "shipped" = those that
             come with the package. The network is then the file's. None = random ones.
+        freeze_unet: Train the propagation alone: the U-Net stays as it begins.
         samples: Folder of prepared samples, which several trainings may share; None =
             one in the output folder.
     """
@@ -99,6 +100,7 @@ class TrainConfig(Config):
     tensorboard: bool = True
     seed: int = 0
     init: Path | None = None
+    freeze_unet: bool = False
     samples: Path | None = None
 
     def __post_init__(self) -> None:

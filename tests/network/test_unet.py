@@ -19,6 +19,8 @@ def stack_for(config: NetworkConfig, seed: int = 0) -> torch.Tensor:
 def shaken(net: ResDepthNet) -> ResDepthNet:
     torch.manual_seed(0)
     torch.nn.init.normal_(net.head.weight, std=0.1)
+    if net.propagation is not None:
+        torch.nn.init.normal_(net.propagation.head.weight, std=0.1)
     return net
 
 
@@ -31,7 +33,7 @@ RESIDUAL_VARIANTS = [v for v in InputVariant if v is not InputVariant.IMAGES_ONL
 def test_a_fresh_network_returns_its_input_depth_exactly(
     variant: InputVariant, gate: bool, training: bool
 ) -> None:
-    config = small(variant=variant, gate=gate)
+    config = small(variant=variant, gate=gate, propagation_channels=0)
     stack = stack_for(config)
     net = ResDepthNet(config).train(training)
     assert stack.abs().max() > INPUT_LIMIT
@@ -86,7 +88,7 @@ def test_every_parameter_learns_once_the_head_is_not_zero() -> None:
 
 
 def test_an_outlier_of_the_input_changes_others_no_more_than_the_limit_does() -> None:
-    config = small(variant="depth-only", valid=False)
+    config = small(variant="depth-only", valid=False, propagation_channels=0)
     net = shaken(ResDepthNet(config)).eval()
     stack = torch.zeros(1, 1, 16, 16)
     stack[..., 8, 8] = INPUT_LIMIT

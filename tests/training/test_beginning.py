@@ -67,6 +67,8 @@ def test_new_inputs_change_nothing_at_first(tmp_path: Path) -> None:
     blind = dataclasses.replace(NETWORK, source_depth=False, valid=False)
     old = ResDepthNet(blind)
     torch.nn.init.normal_(old.head.weight)
+    assert old.propagation is not None
+    torch.nn.init.normal_(old.propagation.head.weight)
     path = tmp_path / "blind.safetensors"
     save_weights(path, old)
     config = TrainConfig(init=path)
@@ -81,6 +83,24 @@ def test_new_inputs_change_nothing_at_first(tmp_path: Path) -> None:
     gradient = wide.encoder[0][0].weight.grad  # type: ignore[index]
     assert isinstance(gradient, torch.Tensor)
     assert all(gradient[:, place].any() for place in range(len(chosen.channels)))
+
+
+def test_a_propagation_is_added_to_weights_that_have_none(tmp_path: Path) -> None:
+    plain = dataclasses.replace(NETWORK, propagation_channels=0)
+    path = tmp_path / "plain.safetensors"
+    save_weights(path, ResDepthNet(plain))
+    config = TrainConfig(init=path, freeze_unet=True)
+    with pytest.raises(ConfigError, match="freeze_unet: the network has no propag"):
+        fresh_network(chosen_network(config, {}), config)
+    wanted = chosen_network(config, {"propagation_channels": 6})
+    network = fresh_network(wanted, config)
+    assert network.propagation is not None
+    for name, value in load_weights(path).state_dict().items():
+        assert torch.equal(network.state_dict()[name], value)
+    kept = TrainConfig(init=tmp_path / "with.safetensors")
+    save_weights(tmp_path / "with.safetensors", network)
+    with pytest.raises(ConfigError, match="propagation_channels 6, not 9"):
+        chosen_network(kept, {"propagation_channels": 9})
 
 
 def test_an_input_that_the_weights_know_is_not_taken_away(weights: Path) -> None:

@@ -12,7 +12,8 @@ from planes import write_plane_workspace
 from resdepth_colmap.errors import TrainingError, WorkspaceError
 from resdepth_colmap.io.depth_map import read_depth_map
 from resdepth_colmap.network.network_config import NetworkConfig
-from resdepth_colmap.network.weights import load_weights
+from resdepth_colmap.network.weights import load_weights, save_weights
+from resdepth_colmap.training.beginning import fresh_network
 from resdepth_colmap.training.crops import CropSampler
 from resdepth_colmap.training.loop import train
 from resdepth_colmap.training.samples import prepare_samples
@@ -65,6 +66,24 @@ def test_a_stopped_training_ends_with_the_same_weights(
     resumed = train([workspace], interrupted, NETWORK, TRAINING)
     first, second = _parameters(whole), _parameters(resumed)
     assert all(torch.equal(first[name], second[name]) for name in first)
+
+
+def test_with_the_unet_frozen_the_propagation_alone_learns(
+    workspace: Path, tmp_path: Path
+) -> None:
+    before = fresh_network(NETWORK, TRAINING)
+    torch.nn.init.normal_(before.head.weight, std=0.1)
+    save_weights(tmp_path / "first.safetensors", before)
+    config = dataclasses.replace(
+        TRAINING, init=tmp_path / "first.safetensors", freeze_unet=True
+    )
+    output = tmp_path / "run"
+    train([workspace], output, NETWORK, config)
+    begun = load_weights(tmp_path / "first.safetensors").state_dict()
+    ended = load_weights(output / "weights.safetensors").state_dict()
+    for name, value in begun.items():
+        same = torch.equal(ended[name], value)
+        assert same != name.startswith("propagation.") or not value.ndim, name
 
 
 def test_the_log_has_a_line_for_each_checkpoint(

@@ -18,7 +18,9 @@ from resdepth_colmap.training.scenes import split_scenes
 from resdepth_colmap.training.train_config import Schedule, TrainConfig
 from resdepth_colmap.training.validation import Scores, ValidationSet
 
-NETWORK = NetworkConfig(levels=3, base_channels=4, max_channels=8)
+NETWORK = NetworkConfig(
+    levels=3, base_channels=4, max_channels=8, propagation_channels=0
+)
 TRAINING = TrainConfig(
     steps=4,
     batch_size=2,
