@@ -194,8 +194,6 @@ class RefineConfig(Config):
         keep_confirmed: Keep the initial depth of a pixel where another view's map or
             the photographs confirm it and the network changes it only a little, or
             little beside the error that it expects to make.
-        follow_edges: Move edges of the depth to those of the photo: a median over what
-            has a pixel's colour.
         tile_px: Side of a square tile, in pixels.
         overlap_px: Overlap of neighbouring tiles, in pixels.
         device: Where the network runs.
@@ -205,7 +203,6 @@ class RefineConfig(Config):
     input: str = "auto"
     passes: int = 1
     keep_confirmed: bool = True
-    follow_edges: bool = True
     tile_px: int = 512
     overlap_px: int = 128
     device: Device = Device.AUTO

@@ -35,7 +35,8 @@ def run() -> None:
         if len(options) < len(sys.argv) - 1:
             name = "middlebury_completed"
             weights = Path(folder) / "unchanging.safetensors"
-            save_weights(weights, ResDepthNet(NetworkConfig(base_channels=1)))
+            unchanging = NetworkConfig(base_channels=1, propagation_channels=0)
+            save_weights(weights, ResDepthNet(unchanging))
             options = ["--weights", str(weights), *options]
         command = ["evaluate", "depth", str(scenes)]
         command += ["--output", str(MEASUREMENTS / f"{name}.json"), *options]

@@ -60,7 +60,7 @@ STEREO, ITERATED = "resdepth_stereo", "resdepth_stereo_iter"
 REFINED_KIND = "refined"
 
 # The networks by themselves.
-REFINING = RefineConfig(passes=1, keep_confirmed=False, follow_edges=False)
+REFINING = RefineConfig(passes=1, keep_confirmed=False)
 
 
 class Options(NamedTuple):
@@ -87,6 +87,8 @@ ADDITIONS = {
     "source_depth": Options({"source_depth": True}),
     "holes": Options(training={"holes_share": TrainConfig.holes_share}),
     "color": Options({"color": True}),
+    "length": Options(training={"distance_power": 2.0}),
+    "propagation": Options({"propagation_channels": 48}),
 }
 """Beyond the paper; each row keeps what those before it have."""
 
@@ -158,15 +160,14 @@ def refined_copies(
 
 
 class Arm(NamedTuple):
-    """Networks that are applied one after the other, and how."""
+    """Networks that are applied one after the other."""
 
     networks: Sequence[ResDepthNet]
-    config: RefineConfig = REFINING
 
     def refined(self, view: ViewInputs) -> DepthMap:
         """Depth after the last network; each warps with what it gets."""
         for network in self.networks:
-            depth = refine_view(view, network, self.config).depth
+            depth = refine_view(view, network, REFINING).depth
             view = dataclasses.replace(view, depth=depth)
         return view.depth
 
@@ -204,7 +205,7 @@ def paper_arms(trainer: Trainer) -> Arms:
 
 
 def beyond_arms(trainer: Trainer) -> Arms:
-    """ResDepth-stereo, what is added to it; what two passes or the edges add then."""
+    """ResDepth-stereo, what is added to it; what two passes add then."""
     arms: Arms = {}
     options = Options()
     for name, more in ADDITIONS.items():
@@ -214,8 +215,6 @@ def beyond_arms(trainer: Trainer) -> Arms:
         network = trainer.network(FOLDERS.get(name, name), options)
         arms[name] = Arm([network])
     arms["two_passes"] = Arm([network, network])
-    following = dataclasses.replace(REFINING, follow_edges=True)
-    arms["follow_edges"] = Arm([network], following)
     return arms
 
 

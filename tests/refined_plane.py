@@ -17,8 +17,13 @@ from resdepth_colmap.network.unet import ResDepthNet
 from resdepth_colmap.pipeline.refine import SourceView, ViewInputs
 from resdepth_colmap.scene import cam_from_cam
 
-SMALL = {"levels": 2, "base_channels": 4, "max_channels": 8}
-TILES = RefineConfig(tile_px=32, overlap_px=8, follow_edges=False)
+SMALL: dict[str, object] = {
+    "levels": 2,
+    "base_channels": 4,
+    "max_channels": 8,
+    "propagation_channels": 0,
+}
+TILES = RefineConfig(tile_px=32, overlap_px=8)
 HOLES = 0.2
 
 

@@ -60,9 +60,7 @@ CACHE_NAME = "resdepth-cache"
     default=StereoBackend.AUTO,
     text="Whose PatchMatch: COLMAP's (needs CUDA), or ours on the CPU.",
 )
-@config_options(
-    RefineConfig, "passes", "keep_confirmed", "follow_edges", "weights", "device"
-)
+@config_options(RefineConfig, "passes", "keep_confirmed", "weights", "device")
 @config_options(StereoConfig, skip=(*NO_MATCHER_OPTIONS, "max_num_sources"))
 @max_residual_option
 @click.option(

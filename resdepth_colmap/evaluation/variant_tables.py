@@ -1,7 +1,7 @@
 """The tables of the paper's variants, and of what was added to the paper."""
 
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from resdepth_colmap.evaluation.markdown import markdown_table, number, percent
@@ -27,12 +27,10 @@ BEYOND = {
     "source_depth": "+ depth maps of other views (completion, two inputs)",
     "holes": "+ filtered and unfiltered maps in one network",
     "color": "+ the reference in colour",
+    "length": "+ errors in units of length in the loss",
+    "propagation": "+ a second network that mixes depths",
     "two_passes": "the same, two passes with shared weights",
-    "follow_edges": "the same, one pass, edges moved to those of the photo",
 }
-BESIDE = {"follow_edges": "two_passes"}
-"""Rows that another stands beside: both are compared with the row before that one."""
-
 LEAST_CHANGE = 0.02
 """A smaller change of a ratio is not told: views are few, and trainings short."""
 
@@ -103,7 +101,7 @@ def _changes(label: str, arms: Mapping[str, Any]) -> str:
     for key, measure in (("mae_ratio", "MAE"), ("medae_ratio", "MedAE")):
         better: list[str] = []
         worse: list[str] = []
-        for before, name in _compared(names):
+        for before, name in itertools.pairwise(names):
             change = arms[name][key] - arms[before][key]
             if abs(change) >= LEAST_CHANGE:
                 kind = better if change < 0 else worse
@@ -116,14 +114,6 @@ def _changes(label: str, arms: Mapping[str, Any]) -> str:
         f"{label.capitalize()}, changes of at least {LEAST_CHANGE} against the row "
         f"before: {'. '.join(told)}."
     )
-
-
-def _compared(names: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """Each row with that which it is compared with, which comes first."""
-    befores: dict[str, str] = {}
-    for before, name in itertools.pairwise(names):
-        befores[name] = befores.get(BESIDE.get(name, ""), before)
-        yield befores[name], name
 
 
 def _measured_by(measured: Mapping[str, Any]) -> str:

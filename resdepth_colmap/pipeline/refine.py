@@ -23,7 +23,6 @@ from resdepth_colmap.pipeline.inputs import (
     warp_sources,
 )
 from resdepth_colmap.pipeline.kept_depth import kept_change, kept_errors
-from resdepth_colmap.pipeline.photo_edges import follow_edges
 from resdepth_colmap.pipeline.source_maps import SourceMap, start_from
 from resdepth_colmap.pipeline.tiling import Window, apply_tiled, pad_to_multiple
 from resdepth_colmap.scene import (
@@ -119,8 +118,7 @@ def refine_view(
     """Refine a depth map: fill, warp, run the network tile by tile, and again.
 
     Each pass warps the sources anew with the depth of the pass before. The mask of real
-    pixels stays that of the first: it tells the network what was measured. Edges of
-    what the network says are moved to those of the photo (docs/adr/0014). A measured
+    pixels stays that of the first: it tells the network what was measured. A measured
     depth that a map of another view confirms is kept, and one that the photographs
     confirm, where the network would change it only a little: matching is more exact
     there than the network. Nor is a change taken that is small beside the error that
@@ -151,8 +149,6 @@ def refine_view(
             outputs = _run_tiled(stack, network, config).to(device)[None]
             refined = (tensors.inverse_depth + outputs[:, :1]).clamp(low, high)
             error = outputs[:, 1:2] if network.config.confidence else None
-            if config.follow_edges:
-                refined = follow_edges(refined, error, tensors)
             if config.keep_confirmed:
                 limit = least_change
                 if error is not None:

@@ -107,7 +107,6 @@ def refine_workspace(
     options = {
         "passes": config.passes,
         "keep_confirmed": config.keep_confirmed,
-        "follow_edges": config.follow_edges,
         "tile_px": config.tile_px,
         "overlap_px": config.overlap_px,
         "weights": facts["weights_sha256"],

@@ -24,7 +24,7 @@ NUM_BATCHES = 8
 NUM_PICTURES = 2
 
 # The network by itself: no rule after it hides what it does to good pixels.
-_REFINING = RefineConfig(passes=1, keep_confirmed=False, follow_edges=False)
+_REFINING = RefineConfig(passes=1, keep_confirmed=False)
 _OFF = 0.02
 
 

@@ -33,7 +33,7 @@ def rendered(tmp_path_factory: pytest.TempPathFactory) -> RenderedEth3d:
 
 def evaluate(tmp_path: Path, root: Path, *arguments: object) -> Result:
     options = ("--image-width", WIDTH_PX, "--stereo", "cpu", *FAST)
-    identity = ("--weights", identity_weights(tmp_path), "--no-follow-edges")
+    identity = ("--weights", identity_weights(tmp_path))
     words = ["evaluate", "eth3d", root, *identity, *options, *arguments]
     return CliRunner().invoke(
         main, [str(word) for word in words], prog_name="resdepth-colmap"

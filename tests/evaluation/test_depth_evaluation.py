@@ -36,7 +36,7 @@ FAST = StereoConfig(num_iterations=3, window_radius=3)
 
 def options(tmp_path: Path, cache: MatchCache | None = None) -> EvaluationOptions:
     weights = identity_weights(tmp_path)
-    refine = RefineConfig(passes=2, weights=weights, follow_edges=False)
+    refine = RefineConfig(passes=2, weights=weights)
     return EvaluationOptions(refine=refine, stereo=FAST, cache=cache)
 
 

@@ -98,13 +98,3 @@ def test_it_is_told_what_each_addition_changed_against_the_row_before() -> None:
     assert (
         "inputs (+0.05). MedAE ratio lower with nothing, higher with nothing." in text
     )
-
-
-def test_two_ways_to_use_the_last_network_are_both_compared_with_it() -> None:
-    found = measured(unfiltered=0.1, color=0.1, two_passes=0.1, follow_edges=0.1)
-    arms = found["sets"]["rendered"]["arms"]
-    arms["two_passes"]["mae_ratio"] = 0.8  # 0.9 before
-    arms["follow_edges"]["mae_ratio"] = 0.7
-    text = beyond_table(found)
-    assert "shared weights (-0.10)" in text
-    assert "edges moved to those of the photo (-0.20)" in text

@@ -1,0 +1,28 @@
+"""Laws of the threads that compiled kernels run on."""
+
+import subprocess
+import sys
+
+
+def test_the_old_tbb_of_open3d_is_nothing_to_warn_of() -> None:
+    code = """
+import warnings
+import open3d
+import numba
+import numpy as np
+from numba.core.errors import NumbaWarning
+from resdepth_colmap.geometry.threading_layer import prefer_openmp
+
+prefer_openmp()
+warnings.simplefilter("error", NumbaWarning)
+
+@numba.njit(parallel=True)
+def doubled(values):
+    for place in numba.prange(values.size):
+        values[place] *= 2.0
+
+values = np.ones(100)
+doubled(values)
+assert (values == 2.0).all()
+"""
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=120)
