@@ -14,6 +14,7 @@ STEPS_PX = (2, 5)
 """How far away, along and across, the pixels are that one may take over from."""
 
 NUM_POOLS = 3
+NUM_MORE = 3  # a residual, its gate, and what to add to the logarithm of the error
 PACKED_PX = 2  # the first convolutions see squares of so many pixels as channels
 LARGEST_STEP = 16.0  # from one limit of what the networks see to the other
 OWN_DEPTH_LOGIT = 4.0  # three quarters of the weight
@@ -73,7 +74,7 @@ class Propagation(nn.Module):
         )
         self.decoder = nn.ModuleList(conv_block(width, width) for width in widths[:-1])
         self.num_candidates = 2 + 8 * len(STEPS_PX)
-        num_outputs = (self.num_candidates + 3) * PACKED_PX**2
+        num_outputs = (self.num_candidates + NUM_MORE) * PACKED_PX**2
         self.head = nn.Conv2d(channels, num_outputs, kernel_size=3, padding=1)
         nn.init.zeros_(self.head.weight)
         nn.init.zeros_(self.head.bias)  # type: ignore[arg-type] # it has one
