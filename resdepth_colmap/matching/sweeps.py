@@ -1,9 +1,9 @@
 """The sweeps of the PatchMatch over the checkerboard. Compiled by numba."""
 
+import numba
 import numpy as np
 from numba import njit, prange
 
-from resdepth_colmap.geometry.threading_layer import prefer_openmp
 from resdepth_colmap.matching.cost import MAX_COST, plane_cost, reference_window
 from resdepth_colmap.matching.perturbation import NUM_TRIALS, make_trials
 from resdepth_colmap.matching.planes import (
@@ -28,7 +28,12 @@ from resdepth_colmap.matching.smoothness import (
 from resdepth_colmap.matching.view_weights import weigh_views
 from resdepth_colmap.matching.visibility import bounded_cost, geometric_cost
 
-prefer_openmp()
+# Without this numba tries TBB first, and warns where it finds an old one.
+numba.config.THREADING_LAYER_PRIORITY = [  # type: ignore[attr-defined] # set at run time
+    "omp",
+    "tbb",
+    "workqueue",
+]
 
 ONE = np.float32(1)
 LEAST_WEIGHT = np.float32(0.01)  # a source below it is not asked about trials

@@ -1,4 +1,4 @@
-"""Laws of the threads that compiled kernels run on."""
+"""Laws of the threads that the matcher's kernels run on."""
 
 import subprocess
 import sys
@@ -11,9 +11,8 @@ import open3d
 import numba
 import numpy as np
 from numba.core.errors import NumbaWarning
-from resdepth_colmap.geometry.threading_layer import prefer_openmp
+import resdepth_colmap.matching.sweeps
 
-prefer_openmp()
 warnings.simplefilter("error", NumbaWarning)
 
 @numba.njit(parallel=True)
