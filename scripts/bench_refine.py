@@ -20,6 +20,7 @@ import torch
 
 from resdepth_colmap.config import RefineConfig
 from resdepth_colmap.evaluation.tables import refine_table
+from resdepth_colmap.network.inference import for_inference
 from resdepth_colmap.network.unet import ResDepthNet
 from resdepth_colmap.network.weights import load_weights, weights_hash
 from resdepth_colmap.pipeline.refine import SourceView, ViewInputs, refine_view
@@ -74,7 +75,7 @@ def main() -> None:
     arguments = parser.parse_args()
     torch.set_num_threads(NUM_THREADS)
     config = RefineConfig(passes=arguments.passes, weights=arguments.weights)
-    network = load_weights(config.weights)
+    network = for_inference(load_weights(config.weights))
     measured = {
         "command": "python scripts/bench_refine.py",
         "date": datetime.datetime.now(datetime.UTC).date().isoformat(),

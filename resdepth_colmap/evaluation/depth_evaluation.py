@@ -16,6 +16,7 @@ from resdepth_colmap.evaluation.depth_report import DepthReport, SceneResult
 from resdepth_colmap.evaluation.match_cache import MatchCache
 from resdepth_colmap.evaluation.paper import PAPER_MAX_RESIDUAL
 from resdepth_colmap.network.device import resolve_device
+from resdepth_colmap.network.inference import for_inference
 from resdepth_colmap.network.unet import ResDepthNet
 from resdepth_colmap.network.weights import load_weights, weights_hash
 from resdepth_colmap.pipeline.progress import Progress, SilentProgress
@@ -80,9 +81,8 @@ def evaluate_scenes(
     """
     listener = listener or Listener()
     backend = matching_backend(options.backend)
-    network = load_weights(
-        options.refine.weights, resolve_device(options.refine.device)
-    )
+    device = resolve_device(options.refine.device)
+    network = for_inference(load_weights(options.refine.weights, device))
     _warm_up(network, options.refine)
     results, failed = [], {}
     with listener.progress.stage("Evaluating", len(sources)) as advance:

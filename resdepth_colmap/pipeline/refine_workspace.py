@@ -15,6 +15,7 @@ from resdepth_colmap.io.model import read_scene
 from resdepth_colmap.io.output import OutputWorkspace, read_record, write_record
 from resdepth_colmap.io.workspace import Workspace
 from resdepth_colmap.network.device import resolve_device
+from resdepth_colmap.network.inference import for_inference
 from resdepth_colmap.network.network_config import NetworkConfig
 from resdepth_colmap.network.unet import ResDepthNet
 from resdepth_colmap.network.weights import load_weights, weights_hash
@@ -97,7 +98,7 @@ def refine_workspace(
     )
     check_maps_exist(workspace, scene, config.input)
     device = resolve_device(config.device)
-    network = load_weights(config.weights, device)
+    network = for_inference(load_weights(config.weights, device))
     _check_num_views(workspace, scene, network.config)
     facts = {
         "weights_sha256": weights_hash(config.weights),
