@@ -13,7 +13,7 @@ from resdepth_colmap.io.output import OutputWorkspace
 from resdepth_colmap.io.workspace import Workspace, original_map_path
 from resdepth_colmap.pipeline.fuse_view import MapFiles
 from resdepth_colmap.pipeline.initial_map import check_map_size, map_path
-from resdepth_colmap.pipeline.kept_depth import FILTERED_SHARE
+from resdepth_colmap.pipeline.source_maps import FILTERED_SHARE
 from resdepth_colmap.scene import Scene, View
 
 ARMS = ("filtered", "unfiltered", "refined")

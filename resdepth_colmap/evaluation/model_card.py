@@ -48,9 +48,10 @@ def _second_network(network: Mapping[str, Any]) -> str:
     channels = network.get("propagation_channels", 0)
     if not channels:
         return ""
+    again = " looks at the second photo again and" if network["second_look"] else ""
     return (
         f", those of a second, small one among them ({channels} channels at half the "
-        "resolution), which mixes each pixel's depth from those around it"
+        f"resolution), which{again} mixes each pixel's depth from those around it"
     )
 
 

@@ -8,7 +8,7 @@ from resdepth_colmap.evaluation.tile_sums import TileSums
 from resdepth_colmap.evaluation.witnesses import Sums
 from resdepth_colmap.geometry.inverse_depth import invert_map
 from resdepth_colmap.geometry.warp import warp_to_reference
-from resdepth_colmap.pipeline.inputs import photo_consistency
+from resdepth_colmap.pipeline.photo_consistency import photo_consistency
 from resdepth_colmap.pipeline.refine import SourceView, ViewInputs
 
 Sampled = tuple[Tensor, Tensor]

@@ -39,6 +39,14 @@ def cropped_K(K: Matrix, left_px: int, top_px: int) -> Matrix:  # noqa: N802
     return cropped
 
 
+def mirrored_K(K: Matrix, width_px: int) -> Matrix:  # noqa: N802
+    """K of an image so wide after its columns have been put in reverse order."""
+    mirrored = np.array(K, dtype=np.float64)
+    mirrored[0] *= -1.0
+    mirrored[0, 2] += width_px - 1
+    return mirrored
+
+
 def to_grid(xy_index: Tensor, width_px: int, height_px: int) -> Tensor:
     """Coordinates for `grid_sample(align_corners=True)`.
 

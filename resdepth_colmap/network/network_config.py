@@ -13,6 +13,9 @@ RED, BLUE = "red", "blue"
 """Channels of the reference in colour, besides its grey values."""
 
 
+_AGAIN = ("source_there", "source_near", "source_far", "nearest", "farthest")
+
+
 class InputVariant(enum.StrEnum):
     """What the network sees (paper, section "Network Variants")."""
 
@@ -50,6 +53,8 @@ class NetworkConfig(Config):
         confidence: Let it predict the scale of its own error.
         propagation_channels: Let a second, small network of so many channels mix each
             pixel's depth from those around it (docs/adr/0015); 0 = none.
+        second_look: Show that one the first source as it would look at the refined
+            depth, at the nearest and at the farthest around it, and let it take these.
         normalisation: How inverse depth is scaled.
     """
 
@@ -65,7 +70,8 @@ class NetworkConfig(Config):
     gate: bool = True
     last_block: bool = True
     confidence: bool = True
-    propagation_channels: int = 48
+    propagation_channels: int = 72
+    second_look: bool = True
     normalisation: Normalisation = Normalisation.ROBUST
 
     def __post_init__(self) -> None:
@@ -104,6 +110,7 @@ class NetworkConfig(Config):
             color=False,
             confidence=False,
             propagation_channels=0,
+            second_look=False,
             normalisation=Normalisation.BASELINE,
         )
 
@@ -121,6 +128,11 @@ class NetworkConfig(Config):
     def propagates(self) -> bool:
         """Whether a second network sharpens what the first one says."""
         return self.propagation_channels > 0 and self.residual
+
+    @property
+    def looks_again(self) -> bool:
+        """Whether the second network looks at the first source again."""
+        return self.second_look and self.propagates and self.uses_sources
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -144,7 +156,8 @@ class NetworkConfig(Config):
     def propagation_inputs(self) -> tuple[str, ...]:
         """Names of what the second network sees, in order."""
         said = ["refined", "log_scale"] if self.confidence else ["refined"]
-        return (*said, *self.channels)
+        again = _AGAIN if self.looks_again else ()
+        return (*said, *self.channels, *again)
 
     @property
     def multiple_px(self) -> int:

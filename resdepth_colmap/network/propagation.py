@@ -1,7 +1,8 @@
 """Depth that each pixel takes over from its surroundings (docs/adr/0015)."""
 
 import itertools
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import torch
@@ -16,6 +17,7 @@ STEPS_PX = (2, 5)
 NUM_POOLS = 3
 NUM_MORE = 3  # a residual, its gate, and what to add to the logarithm of the error
 PACKED_PX = 2  # the first convolutions see squares of so many pixels as channels
+EXTREME_RADIUS_PX = 6  # a matcher's window of 11 x 11 makes things fatter by 5
 LARGEST_STEP = 16.0  # from one limit of what the networks see to the other
 OWN_DEPTH_LOGIT = 4.0  # three quarters of the weight
 
@@ -41,20 +43,24 @@ class Propagation(nn.Module):
     and 1, draws a step (convolutional spatial propagation: Cheng et al., ECCV 2018;
     here in one step, from fixed offsets, with weights from a softmax). The candidates
     are the refined inverse depth of the pixel, that of the eight pixels around it at
-    each of `STEPS_PX`, and the initial one. A small gated residual is added.
+    each of `STEPS_PX`, the initial one, and others that the caller knows. A small gated
+    residual is added.
 
     It works at half the resolution, where each 2 x 2 square is one pixel of four times
     the channels: as exact, and cheaper. A fresh one gives all pixels the same weights,
     most of it to the pixel itself, and adds nothing.
     """
 
-    def __init__(self, num_inputs: int, channels: int, levels: int) -> None:
+    def __init__(
+        self, num_inputs: int, channels: int, levels: int, num_more: int = 0
+    ) -> None:
         """Build it with fresh weights.
 
         Args:
             num_inputs: Channels that it sees.
             channels: Channels of the first level; 8/3 of them at the last.
             levels: Height and width will be multiples of 2**levels.
+            num_more: Depths that the caller adds to those to mix.
         """
         super().__init__()
         widths = [channels * factor // 3 for factor in (3, 4, 6, 8)]
@@ -73,7 +79,7 @@ class Propagation(nn.Module):
             for before, after in pairs
         )
         self.decoder = nn.ModuleList(conv_block(width, width) for width in widths[:-1])
-        self.num_candidates = 2 + 8 * len(STEPS_PX)
+        self.num_candidates = 2 + 8 * len(STEPS_PX) + num_more
         num_outputs = (self.num_candidates + NUM_MORE) * PACKED_PX**2
         self.head = nn.Conv2d(channels, num_outputs, kernel_size=3, padding=1)
         nn.init.zeros_(self.head.weight)
@@ -81,26 +87,35 @@ class Propagation(nn.Module):
         with torch.no_grad():
             self.head.bias[: PACKED_PX**2] = OWN_DEPTH_LOGIT  # type: ignore[index]
 
-    def forward(self, seen: Tensor, refined: Tensor, initial: Tensor) -> Propagated:
+    def forward(
+        self,
+        seen: Tensor,
+        refined: Tensor,
+        initial: Tensor,
+        more: Sequence[Tensor] = (),
+    ) -> Propagated:
         """Mix the depths of a batch of tiles.
 
         Args:
             seen: What decides, shape (B, C, H, W), float.
             refined: Normalised inverse depth so far, shape (B, 1, H, W).
             initial: The same before any refinement.
+            more: Further depths to mix, each of that shape.
         """
         packed = pixel_unshuffle(seen, PACKED_PX)
         outputs = pixel_shuffle(self.head(self._features(packed)), PACKED_PX)
         # Channel by channel from here on, as a processor's cache holds one of them.
         outputs = outputs.to(refined.dtype).contiguous()
-        weights = torch.softmax(outputs[:, : self.num_candidates], dim=1)
-        last = outputs[:, self.num_candidates :]
+        logits, last = torch.split(outputs, [self.num_candidates, NUM_MORE], dim=1)
+        # Unbound at once: the gradient of a slice is as large as all of them.
+        _, *weights = torch.softmax(logits, dim=1)[:, :, None].unbind(dim=1)
+        residual, gate, log_scale_change = last[:, :, None].unbind(dim=1)
         mixed = refined
-        for place, candidate in enumerate(_others(refined, initial), start=1):
+        candidates = (*_around(refined), initial, *more)
+        for weight, candidate in zip(weights, candidates, strict=True):
             step = (candidate - refined).clamp(-LARGEST_STEP, LARGEST_STEP)
-            mixed = mixed + weights[:, place : place + 1] * step
-        residual = last[:, :1] * torch.sigmoid(last[:, 1:2])
-        return Propagated(mixed + residual, last[:, 2:])
+            mixed = mixed + weight * step
+        return Propagated(mixed + residual * torch.sigmoid(gate), log_scale_change)
 
     def _features(self, packed: Tensor) -> Tensor:
         maps = [self.stem(packed)]
@@ -112,8 +127,39 @@ class Propagation(nn.Module):
         return features
 
 
-def _others(refined: Tensor, initial: Tensor) -> Iterator[Tensor]:
-    """The depths to mix the pixel's own with, in order, each of its shape."""
+def extremes(inverse_depth: Tensor) -> tuple[Tensor, Tensor]:
+    """The nearest and the farthest surface within `EXTREME_RADIUS_PX` of each pixel.
+
+    Args:
+        inverse_depth: Shape (B, 1, H, W), normalised or not.
+
+    Returns:
+        The greatest and the least value of the square around each pixel, each of that
+        shape.
+    """
+    return _greatest(inverse_depth), -_greatest(-inverse_depth)
+
+
+def _greatest(values: Tensor) -> Tensor:
+    padded = pad(values, (EXTREME_RADIUS_PX,) * 4, value=-math.inf)
+    return _running_greatest(_running_greatest(padded, dim=-2), dim=-1)
+
+
+def _running_greatest(values: Tensor, dim: int) -> Tensor:
+    """Of windows along one axis; by doubling, several times faster than max pooling."""
+    length, wanted = 1, 2 * EXTREME_RADIUS_PX + 1
+    while length < wanted:
+        step = min(length, wanted - length)
+        size = values.shape[dim] - step
+        values = torch.maximum(
+            values.narrow(dim, 0, size), values.narrow(dim, step, size)
+        )
+        length += step
+    return values
+
+
+def _around(refined: Tensor) -> Iterator[Tensor]:
+    """The depths of the pixels around each pixel, in order, each of its shape."""
     border = max(STEPS_PX)
     padded = pad(refined, (border, border, border, border), mode="replicate")
     height_px, width_px = refined.shape[-2:]
@@ -122,4 +168,3 @@ def _others(refined: Tensor, initial: Tensor) -> Iterator[Tensor]:
             if (y, x) != (0, 0):
                 rows = padded[..., border + y :, :][..., :height_px, :]
                 yield rows[..., border + x :][..., :width_px]
-    yield initial

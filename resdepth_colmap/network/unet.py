@@ -1,5 +1,6 @@
 """ResDepth's U-Net (paper, section "Network Architecture")."""
 
+from collections.abc import Callable
 from typing import NamedTuple, cast
 
 import torch
@@ -7,13 +8,18 @@ from torch import Tensor, nn
 
 from resdepth_colmap.network.conv_block import conv_block
 from resdepth_colmap.network.network_config import NetworkConfig
-from resdepth_colmap.network.propagation import Propagation
+from resdepth_colmap.network.propagation import Propagation, extremes
 
 INPUT_LIMIT = 8.0
 """The convolutions see the normalised inverse depth clamped to plus or minus this."""
 
 LOG_SCALE_LIMITS = (-8.0, 4.0)
 """The propagation sees the logarithm of the expected error clamped to these."""
+
+
+Look = Callable[[Tensor], Tensor]
+"""Grey values of the first source where normalised inverse depths, shape (B, C, H, W),
+would project into it, of that shape."""
 
 
 class Refinement(NamedTuple):
@@ -88,18 +94,21 @@ class ResDepthNet(nn.Module):
                 len(config.propagation_inputs),
                 config.propagation_channels,
                 config.levels,
+                num_more=2 * config.looks_again,
             )
             if config.propagates
             else None
         )
 
-    def forward(self, stack: Tensor) -> Refinement:
+    def forward(self, stack: Tensor, look: Look | None = None) -> Refinement:
         """Refine a batch of tiles.
 
         Args:
             stack: Inputs in the order of `config.channels`, shape (B, C, H, W), float;
                 channel 0 is the normalised inverse depth unless the variant is
                 images-only. H and W are multiples of 2**levels.
+            look: Shows the first source at any depth; without it a network that looks
+                again sees black.
 
         Returns:
             The refined inverse depth and its expected error, both normalised.
@@ -114,17 +123,24 @@ class ResDepthNet(nn.Module):
             residual = residual * torch.sigmoid(outputs[:, 1:2])
         refined = stack[:, :1] + residual if self.config.residual else residual
         log_scale = outputs[:, -1:] if self.config.confidence else None
-        return self._propagate(stack, Refinement(refined, log_scale))
+        return self._propagate(stack, Refinement(refined, log_scale), look)
 
-    def _propagate(self, stack: Tensor, before: Refinement) -> Refinement:
+    def _propagate(
+        self, stack: Tensor, before: Refinement, look: Look | None
+    ) -> Refinement:
         if self.propagation is None:
             return before
         seen = [before.inverse_depth.clamp(-INPUT_LIMIT, INPUT_LIMIT)]
         if before.log_scale is not None:
             seen.append(before.log_scale.clamp(*LOG_SCALE_LIMITS))
         seen.append(self._squash(stack))
+        more: tuple[Tensor, ...] = ()
+        if self.config.looks_again:
+            more = extremes(before.inverse_depth)
+            seen.append(_seen_again(torch.cat([before.inverse_depth, *more], 1), look))
+            seen += [depth.clamp(-INPUT_LIMIT, INPUT_LIMIT) for depth in more]
         propagated = self.propagation(
-            torch.cat(seen, dim=1), before.inverse_depth, stack[:, :1]
+            torch.cat(seen, dim=1), before.inverse_depth, stack[:, :1], more
         )
         log_scale = before.log_scale
         if log_scale is not None:
@@ -165,3 +181,10 @@ class ResDepthNet(nn.Module):
                 f"input of {width_px} x {height_px} px but {self.config.levels} levels "
                 f"need multiples of {multiple_px} px."
             )
+
+
+def _seen_again(depths: Tensor, look: Look | None) -> Tensor:
+    """The source at these depths; where it looks is no way for gradients."""
+    if look is None:
+        return torch.zeros_like(depths)
+    return look(depths.detach().float()).to(depths.dtype)

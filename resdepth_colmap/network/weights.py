@@ -26,7 +26,12 @@ from resdepth_colmap.network.unet import ResDepthNet
 
 FORMAT = "resdepth-colmap"
 FORMAT_VERSION = 1
-_OLDER = {"source_depth": False, "color": False, "propagation_channels": 0}
+_OLDER = {
+    "source_depth": False,
+    "color": False,
+    "propagation_channels": 0,
+    "second_look": False,
+}
 """Options that the headers of older files do not name, as those networks were."""
 
 WAY_OUT = "use a file that `resdepth-colmap train` wrote, or leave out --weights"

@@ -11,7 +11,6 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
-from torch.nn.functional import avg_pool2d
 
 from resdepth_colmap.geometry.holes import fill_holes
 from resdepth_colmap.geometry.inverse_depth import invert_map
@@ -24,31 +23,16 @@ from resdepth_colmap.network.network_config import (
     NetworkConfig,
     Normalisation,
 )
-from resdepth_colmap.network.unet import INPUT_LIMIT
+from resdepth_colmap.network.unet import INPUT_LIMIT, Look
+from resdepth_colmap.pipeline.photo_consistency import photo_consistency
+from resdepth_colmap.pipeline.second_look import SecondLook, Sight, SourceTensors
 from resdepth_colmap.scene import DepthMap, FloatMap
 
-NCC_WINDOW_PX = 7
-NCC_VARIANCE_FLOOR = 4e-6  # (half a grey level of 255) squared: weaker is noise
-NO_EVIDENCE = 0.5  # photo-consistency of a correlation of 0
 LEAST_VALID_SHARE = 0.05  # below it, filled pixels count in the statistics too
 LEAST_RELATIVE_SPREAD = 0.02  # of the median: a fronto-parallel wall has no spread
 STATISTICS_SIDE_PX = 256  # quantiles of more pixels than that squared cost only time
 LARGEST_CHANGE = 4.0  # relative, of what another map says; more is an outlier
 DEFAULT_BASELINE_RATIO = 0.1  # baseline over depth where there is no second view
-
-
-class SourceTensors(NamedTuple):
-    """A second view.
-
-    Attributes:
-        gray: Grey values in 0..1, shape (B, 1, Hs, Ws).
-        K: K for index coordinates, shape (B, 3, 3), in pixels.
-        source_from_reference: Pose, shape (B, 3, 4), translation in units.
-    """
-
-    gray: Tensor
-    K: Tensor
-    source_from_reference: Tensor
 
 
 class ViewTensors(NamedTuple):
@@ -66,6 +50,7 @@ class ViewTensors(NamedTuple):
             H, W), bool; likewise.
         colors: RGB values of the reference in 0..1, shape (B, 3, H, W); None = it is
             grey.
+        is_filtered: Whether a filter has left its holes, so that what is there is sure.
     """
 
     inverse_depth: Tensor
@@ -76,6 +61,7 @@ class ViewTensors(NamedTuple):
     carried: Tensor | None = None
     confirmed: Tensor | None = None
     colors: Tensor | None = None
+    is_filtered: bool = False
 
 
 class InputStack(NamedTuple):
@@ -87,21 +73,26 @@ class InputStack(NamedTuple):
         guidance: The channels of the network that follow "inverse_depth", in the order
             of `NetworkConfig.channels`, shape (B, C, H, W); C may be 0.
         baseline: Distance to the first source, shape (B, 1, 1, 1), in units.
+        second_look: Shows the first source at other depths than the initial one; None =
+            there is no source, or the network takes none.
     """
 
     inverse_depth: Tensor
     valid: Tensor
     guidance: Tensor
     baseline: Tensor
+    second_look: SecondLook | None = None
 
     def crop(self, top_px: int, left_px: int, height_px: int, width_px: int) -> Self:
         """The same of a window of the view."""
+        look = self.second_look
         rows = slice(top_px, top_px + height_px)
         columns = slice(left_px, left_px + width_px)
         return self._replace(
             inverse_depth=self.inverse_depth[..., rows, columns],
             valid=self.valid[..., rows, columns],
             guidance=self.guidance[..., rows, columns],
+            second_look=look and look.crop(top_px, left_px),
         )
 
 
@@ -141,7 +132,29 @@ def initial_maps(depth: DepthMap) -> tuple[FloatMap, NDArray[np.bool_]]:
     return invert_map(fill_holes(depth)), invert_map(depth) > 0
 
 
-def build_inputs(view: ViewTensors, config: NetworkConfig) -> InputStack:
+class Seen(NamedTuple):
+    """What the second views show where a view's depth projects into them.
+
+    Attributes:
+        warped: Of each source the image and where it is inside, in the reference
+            camera, shapes (B, 1, H, W).
+        consistency: How badly the best of them matches the reference, likewise
+            (`photo_consistency`).
+    """
+
+    warped: tuple[tuple[Tensor, Tensor], ...]
+    consistency: Tensor
+
+
+def seen_by_sources(view: ViewTensors, num_sources: int) -> Seen:
+    """Look through so many sources, or as many as there are."""
+    warped = warp_sources(view, num_sources)
+    return Seen(tuple(warped), photo_consistency(view.gray, warped))
+
+
+def build_inputs(
+    view: ViewTensors, config: NetworkConfig, seen: Seen | None = None
+) -> InputStack:
     """Warp the second views and stack what the network of that configuration sees.
 
     Args:
@@ -149,6 +162,7 @@ def build_inputs(view: ViewTensors, config: NetworkConfig) -> InputStack:
             ones become channels of zeros.
         config: Says which channels. The baseline too is that of a view without
             sources if the network sees none: it must not depend on who calls.
+        seen: By the sources of that network, if it is known.
 
     Returns:
         The stack, on the device and in the type of the view's inverse depth.
@@ -156,11 +170,11 @@ def build_inputs(view: ViewTensors, config: NetworkConfig) -> InputStack:
     channels = {"reference": view.gray, "valid": view.valid.to(view.gray.dtype)}
     channels |= _color_channels(view)
     if config.uses_sources:
-        warped = warp_sources(view, config.num_sources)
-        channels["photo_consistency"] = photo_consistency(view.gray, warped)
+        seen = seen or seen_by_sources(view, config.num_sources)
+        channels["photo_consistency"] = seen.consistency
         for index in range(config.num_sources):
-            is_there = index < len(warped)
-            image = warped[index][0] if is_there else torch.zeros_like(view.gray)
+            is_there = index < len(seen.warped)
+            image = seen.warped[index][0] if is_there else torch.zeros_like(view.gray)
             channels[f"source_{index}"] = image
     channels |= _carried_channels(view)
     names = [name for name in config.channels if name != "inverse_depth"]
@@ -168,7 +182,13 @@ def build_inputs(view: ViewTensors, config: NetworkConfig) -> InputStack:
         view = view._replace(sources=())
     nothing = view.inverse_depth[:, :0]
     guidance = torch.cat([nothing, *(channels[name] for name in names)], dim=1)
-    return InputStack(view.inverse_depth, view.valid, guidance, _baseline(view))
+    return InputStack(
+        inverse_depth=view.inverse_depth,
+        valid=view.valid,
+        guidance=guidance,
+        baseline=_baseline(view),
+        second_look=_second_look(view),
+    )
 
 
 def warp_sources(view: ViewTensors, num_sources: int) -> list[tuple[Tensor, Tensor]]:
@@ -183,28 +203,6 @@ def warp_sources(view: ViewTensors, num_sources: int) -> list[tuple[Tensor, Tens
         )
         for source in view.sources[:num_sources]
     ]
-
-
-def photo_consistency(reference: Tensor, warped: list[tuple[Tensor, Tensor]]) -> Tensor:
-    """How badly the best warped source matches the reference, in 0..1.
-
-    (1 - NCC) / 2, with the zero-mean normalised cross-correlation of 7 x 7 windows: 0 =
-    same pattern, 0.5 = no relation, 1 = negative. Brightness and contrast do not
-    matter. Without texture the correlation goes to 0; where no source sees the pixel
-    the value is 0.5, as there is no evidence either way.
-
-    Args:
-        reference: Grey values, shape (B, 1, H, W).
-        warped: Of each source the image and where it is inside, shapes (B, 1, H, W).
-
-    Returns:
-        The least value of all sources, shape (B, 1, H, W).
-    """
-    best = torch.full_like(reference, math.inf)
-    for image, inside in warped:
-        value = 0.5 * (1.0 - _windowed_ncc(reference, image, inside))
-        best = torch.where(inside, torch.minimum(best, value), best)
-    return torch.where(torch.isinf(best), NO_EVIDENCE, best)
 
 
 def tile_scaling(stack: InputStack, kind: Normalisation) -> Scaling:
@@ -259,6 +257,28 @@ def network_input(stack: InputStack, config: NetworkConfig) -> tuple[Tensor, Sca
     return torch.cat([normalised, guidance], dim=1), scaling
 
 
+def scaled_look(stack: InputStack, scaling: Scaling) -> Look | None:
+    """What a network that looks again is given, besides `network_input`.
+
+    Args:
+        stack: The tile, or a batch of tiles.
+        scaling: Of the same.
+    """
+    if stack.second_look is None:
+        return None
+    gray_at = stack.second_look.gray_at
+    return lambda normalised: gray_at(scaling.restore(normalised))
+
+
+def _second_look(view: ViewTensors) -> SecondLook | None:
+    if not view.sources:
+        return None
+    source = view.sources[0]
+    return SecondLook(
+        tuple(Sight(K, source.item(place)) for place, K in enumerate(view.K))
+    )
+
+
 def _color_channels(view: ViewTensors) -> dict[str, Tensor]:
     """What grey does not tell: red and blue. Those of a grey photo are its grey."""
     if view.colors is None:
@@ -287,27 +307,3 @@ def _baseline(view: ViewTensors) -> Tensor:
 
 def _per_tile(values: Tensor) -> Tensor:
     return values[:, None, None, None]
-
-
-def _windowed_ncc(reference: Tensor, image: Tensor, inside: Tensor) -> Tensor:
-    """Correlation in -1..1 over those pixels of each window that are inside."""
-    weight = inside.to(reference.dtype)
-    share = _window_mean(weight).clamp(min=1.0 / NCC_WINDOW_PX**2)
-
-    def mean(values: Tensor) -> Tensor:
-        return _window_mean(values * weight) / share
-
-    mean_reference, mean_image = mean(reference), mean(image)
-    variance_reference = mean(reference**2) - mean_reference**2
-    variance_image = mean(image**2) - mean_image**2
-    covariance = mean(reference * image) - mean_reference * mean_image
-    floor = NCC_VARIANCE_FLOOR
-    product = (variance_reference.clamp(min=0) + floor) * (
-        variance_image.clamp(min=0) + floor
-    )
-    return (covariance / product.sqrt()).clamp(-1.0, 1.0)
-
-
-def _window_mean(values: Tensor) -> Tensor:
-    radius = NCC_WINDOW_PX // 2
-    return avg_pool2d(values, NCC_WINDOW_PX, stride=1, padding=radius)

@@ -15,14 +15,14 @@ from resdepth_colmap.geometry.normals import normals_from_depth
 from resdepth_colmap.network.unet import ResDepthNet
 from resdepth_colmap.pipeline.inputs import (
     InputStack,
-    SourceTensors,
     ViewTensors,
     build_inputs,
     network_input,
-    photo_consistency,
-    warp_sources,
+    scaled_look,
+    seen_by_sources,
 )
-from resdepth_colmap.pipeline.kept_depth import kept_change, kept_errors
+from resdepth_colmap.pipeline.kept_depth import KeptDepth
+from resdepth_colmap.pipeline.second_look import SourceTensors
 from resdepth_colmap.pipeline.source_maps import SourceMap, start_from
 from resdepth_colmap.pipeline.tiling import Window, apply_tiled, pad_to_multiple
 from resdepth_colmap.scene import (
@@ -120,9 +120,9 @@ def refine_view(
     Each pass warps the sources anew with the depth of the pass before. The mask of real
     pixels stays that of the first: it tells the network what was measured. A measured
     depth that a map of another view confirms is kept, and one that the photographs
-    confirm, where the network would change it only a little: matching is more exact
-    there than the network. Nor is a change taken that is small beside the error that
-    the network itself expects (docs/adr/0006 and 0012).
+    confirm, where the network would change it only a little and the photographs speak
+    against it. Nor is a change taken that is small beside the error that the network
+    itself expects (docs/adr/0006 and 0016).
 
     Args:
         view: Initial depth, images and poses; sources that the network does not take
@@ -143,17 +143,18 @@ def refine_view(
         low = float(measured.min()) * LEAST_INVERSE_RATIO
         high = float(measured.max()) * LARGEST_INVERSE_RATIO
         initial = tensors.inverse_depth
-        least_change, num_errors = kept_change(tensors) * initial, kept_errors(tensors)
-        for _ in range(config.passes):
-            stack = build_inputs(tensors, network.config)
+        num_sources = network.config.num_sources
+        seen = seen_by_sources(tensors, num_sources)
+        kept_depth = KeptDepth(tensors, num_sources, seen.consistency)
+        for number in range(config.passes):
+            if number > 0:
+                seen = seen_by_sources(tensors, num_sources)
+            stack = build_inputs(tensors, network.config, seen)
             outputs = _run_tiled(stack, network, config).to(device)[None]
             refined = (tensors.inverse_depth + outputs[:, :1]).clamp(low, high)
             error = outputs[:, 1:2] if network.config.confidence else None
             if config.keep_confirmed:
-                limit = least_change
-                if error is not None:
-                    limit = torch.maximum(limit, num_errors * error)
-                is_kept = (refined - initial).abs() < limit
+                is_kept = kept_depth.is_kept(refined, error)
                 refined = torch.where(is_kept, initial, refined)
             tensors = tensors._replace(inverse_depth=refined)
         if error is not None:
@@ -200,7 +201,8 @@ def _refine_tile(tile: InputStack, network: ResDepthNet) -> Tensor:
     """What `_run_tiled` returns, of one tile of any size, shape (1, 1 or 2, h, w)."""
     channels, scaling = network_input(tile, network.config)
     padded = pad_to_multiple(channels, network.config.multiple_px)
-    output = network(padded.contiguous(memory_format=torch.channels_last))
+    padded = padded.contiguous(memory_format=torch.channels_last)
+    output = network(padded, scaled_look(tile, scaling))
     height_px, width_px = channels.shape[-2:]
     refined = output.inverse_depth[..., :height_px, :width_px]
     if network.config.residual:
@@ -244,6 +246,7 @@ def view_tensors(view: ViewInputs, device: torch.device, use_maps: bool) -> View
         ),
         carried=None if start.carried is None else _image(start.carried, device),
         confirmed=None if start.confirmed is None else _mask(start.confirmed, device),
+        is_filtered=start.is_filtered,
     )
 
 
@@ -261,7 +264,7 @@ def _mask(flags: NDArray[np.bool_], device: torch.device) -> Tensor:
 
 
 def _correlation(tensors: ViewTensors, num_sources: int) -> Tensor:
-    badness = photo_consistency(tensors.gray, warp_sources(tensors, num_sources))
+    badness = seen_by_sources(tensors, num_sources).consistency
     return (1.0 - 2.0 * badness).clamp(min=0.0)
 
 

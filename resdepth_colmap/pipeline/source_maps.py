@@ -12,8 +12,10 @@ from resdepth_colmap.geometry.completion import complete_from_background
 from resdepth_colmap.geometry.forward_warp import carry_inverse_depth
 from resdepth_colmap.geometry.inverse_depth import invert_map
 from resdepth_colmap.pipeline.inputs import initial_maps
-from resdepth_colmap.pipeline.kept_depth import FILTERED_SHARE
 from resdepth_colmap.scene import DepthMap, FloatMap, Matrix
+
+FILTERED_SHARE = 0.95
+"""A map with less of its pixels filled has been filtered."""
 
 NUM_SOURCE_MAPS = 4
 """Other views whose maps are looked at."""
@@ -54,12 +56,14 @@ class Start(NamedTuple):
         carried: What the maps of other views say, shape (H, W), float32, in 1/unit; 0 =
             nothing. None = there are no maps that are of any use.
         confirmed: Where one of them says the same as was measured; likewise.
+        is_filtered: Whether the map has so many holes that it must have been filtered.
     """
 
     inverse_depth: FloatMap
     valid: npt.NDArray[np.bool_]
     carried: FloatMap | None = None
     confirmed: npt.NDArray[np.bool_] | None = None
+    is_filtered: bool = False
 
 
 def start_from(depth: DepthMap, K: Matrix, maps: Sequence[SourceMap]) -> Start:
@@ -78,15 +82,17 @@ def start_from(depth: DepthMap, K: Matrix, maps: Sequence[SourceMap]) -> Start:
         ValueError: If no pixel is valid.
     """
     filled, valid = initial_maps(depth)
+    is_filtered = bool(valid.mean() < FILTERED_SHARE)
+    alone = Start(filled, valid, is_filtered=is_filtered)
     if not maps:
-        return Start(filled, valid)
+        return alone
     carried, confirms = carried_depth(filled, K, maps)
     confirmed = valid & confirms
     if confirmed.sum() < LEAST_CONFIRMED_SHARE * valid.sum():
-        return Start(filled, valid)
-    if valid.mean() < FILTERED_SHARE:
+        return alone
+    if is_filtered:
         filled, _ = initial_maps(np.where(valid, depth, invert_map(carried)))
-        return Start(filled, valid, carried, confirmed)
+        return Start(filled, valid, carried, confirmed, is_filtered)
     along_rows = goes_along_rows(maps[0], K, depth.shape)
     completed = complete_from_background(filled, confirmed, along_rows)
     return Start(completed, confirmed, carried, confirmed)

@@ -5,21 +5,26 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from torch import Tensor
 
 from resdepth_colmap.errors import ConfigError
 from resdepth_colmap.network.network_config import InputVariant, NetworkConfig
 from resdepth_colmap.network.unet import ResDepthNet
 from resdepth_colmap.network.weights import default_weights_path, load_weights
 from resdepth_colmap.training.train_config import Preset, TrainConfig
+from resdepth_colmap.training.widening import widened
 
 SHIPPED = Path("shipped")
 """As the file to start from: the weights that come with the package."""
 
-_FIRST_KERNEL = "encoder.0.0.weight"
-_PROPAGATION_KERNEL = "propagation.stem.0.0.weight"
-_MORE = ("valid", "photo_consistency", "source_depth", "color", "propagation_channels")
-"""What a network may have that the weights to start from have not."""
+_MORE = (
+    "valid",
+    "photo_consistency",
+    "source_depth",
+    "color",
+    "propagation_channels",
+    "second_look",
+)
+"""What a network may have that the weights to start from have not, or have less of."""
 
 
 def chosen_network(
@@ -65,7 +70,7 @@ def fresh_network(network_config: NetworkConfig, config: TrainConfig) -> ResDept
         WeightsError: If the weights to start from cannot be read.
         ConfigError: If they are of another network, or there is no propagation that
             could be trained alone. One that sees less will do: it begins as blind to
-            the new inputs as it was; so will one without propagation.
+            the new inputs as it was; so will one with a narrower propagation, or none.
     """
     torch.manual_seed(config.seed)
     network = ResDepthNet(network_config)
@@ -78,36 +83,15 @@ def fresh_network(network_config: NetworkConfig, config: TrainConfig) -> ResDept
         path = _path(config.init)
         loaded = load_weights(path)
         _check_fits(path, loaded.config, network_config)
-        weights = loaded.state_dict()
-        _widen(weights, loaded.config, network_config)
-        network.load_state_dict({**network.state_dict(), **weights})
+        weights = widened(
+            loaded.state_dict(), loaded.config, network_config, network.state_dict()
+        )
+        network.load_state_dict(weights)
     return network
 
 
 def _path(init: Path) -> Path:
     return default_weights_path() if init == SHIPPED else init
-
-
-def _widen(
-    weights: dict[str, Tensor], theirs: NetworkConfig, ours: NetworkConfig
-) -> None:
-    """Give the first kernels zeros for the inputs that they did not see."""
-    names = {
-        _FIRST_KERNEL: (theirs.channels, ours.channels),
-        _PROPAGATION_KERNEL: (theirs.propagation_inputs, ours.propagation_inputs),
-    }
-    for key in names.keys() & weights.keys():
-        weights[key] = _widened(weights[key], *names[key])
-
-
-def _widened(kernel: Tensor, known: tuple[str, ...], all_: tuple[str, ...]) -> Tensor:
-    """Each name is one channel of the kernel, or as many as each of the others."""
-    group = kernel.shape[1] // len(known)
-    wide = kernel.new_zeros(kernel.shape[0], group * len(all_), *kernel.shape[2:])
-    for name, part in zip(known, kernel.split(group, dim=1), strict=True):  # type: ignore[no-untyped-call] # torch's own
-        place = all_.index(name) * group
-        wide[:, place : place + group] = part
-    return wide
 
 
 def _check_fits(path: Path, theirs: NetworkConfig, ours: NetworkConfig) -> None:
@@ -116,7 +100,7 @@ def _check_fits(path: Path, theirs: NetworkConfig, ours: NetworkConfig) -> None:
         f"{name} {other[name]}, not {wanted[name]}"
         for name in wanted
         if other[name] != wanted[name]
-        and not (name in _MORE and wanted[name] and not other[name])
+        and not (name in _MORE and wanted[name] > other[name])
     ]
     if differences:
         raise ConfigError(

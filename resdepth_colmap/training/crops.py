@@ -1,5 +1,6 @@
 """Random crops of training samples, in batches."""
 
+import collections
 import dataclasses
 import functools
 import hashlib
@@ -13,8 +14,10 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from resdepth_colmap.errors import TrainingError
+from resdepth_colmap.geometry.pixels import cropped_K, mirrored_K
 from resdepth_colmap.network.network_config import BLUE, RED, NetworkConfig
-from resdepth_colmap.pipeline.inputs import InputStack, network_input
+from resdepth_colmap.pipeline.inputs import InputStack, Scaling, network_input
+from resdepth_colmap.pipeline.second_look import SecondLook, Sight, SourceTensors
 from resdepth_colmap.training.samples import (
     COMPLETED,
     DENSE,
@@ -37,8 +40,8 @@ class Batch(NamedTuple):
         inputs: The network's input, shape (B, C, H, W).
         target: True inverse depth, normalised as the input is, shape (B, 1, H, W).
         known: Where there is truth, shape (B, 1, H, W), bool.
-        spread: What a normalised inverse depth of 1 is over one of 0, less 1: their
-            ratio to the tile's offset is 1 + spread * x, shape (B, 1, 1, 1).
+        scaling: How that was done.
+        second_look: Shows the first sources at other depths.
         importance: How much each pixel counts, shape (B, 1, H, W), 1 in the mean.
         names: Names of the samples of all processes, for the message when a loss is
             not a number.
@@ -47,7 +50,8 @@ class Batch(NamedTuple):
     inputs: Tensor
     target: Tensor
     known: Tensor
-    spread: Tensor
+    scaling: Scaling
+    second_look: SecondLook
     importance: Tensor
     names: tuple[str, ...]
 
@@ -57,10 +61,15 @@ class Batch(NamedTuple):
             inputs=self.inputs.to(device),
             target=self.target.to(device),
             known=self.known.to(device),
-            spread=self.spread.to(device),
+            scaling=Scaling(*(values.to(device) for values in self.scaling)),
+            second_look=self.second_look.to(device),
             importance=self.importance.to(device),
             names=self.names,
         )
+
+    def look(self, normalised: Tensor) -> Tensor:
+        """The first sources at these inverse depths (`network.unet.Look`)."""
+        return self.second_look.gray_at(self.scaling.restore(normalised))
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -116,7 +125,8 @@ class CropSampler:
             inputs=inputs,
             target=scaling.normalise(target),
             known=known,
-            spread=scaling.scale / scaling.offset,
+            scaling=scaling,
+            second_look=SecondLook(tuple(_sight(crop) for crop in crops)),
             importance=self._importance(stack.valid),
             names=tuple(path.stem for path, _ in draws),
         )
@@ -166,8 +176,8 @@ class CropSampler:
         """A window of a sample, mirrored in half of the cases.
 
         The sources in it were warped into the reference camera before: mirrored
-        together, all channels are those of a mirrored pair of views. (Mirroring the
-        photographs and warping then would need mirrored poses.)
+        together, all channels are those of a mirrored pair of views. The source that
+        will be looked at again stays as it is: the camera of the crop is mirrored.
         """
         sample = read_sample(path)
         limits = zip(sample.target.shape, size, strict=True)
@@ -178,16 +188,15 @@ class CropSampler:
             cropped = values[..., rows, columns][..., ::flip]
             return np.ascontiguousarray(cropped)
 
-        guidance = cut(sample.guidance[self._channels]).astype(np.float32)
-        if self.vary_light:
-            guidance = self._other_light(guidance, rng)
-        return Sample(
+        K = cropped_K(sample.K, columns.start, rows.start)
+        crop = sample._replace(
             inverse_depth=cut(sample.inverse_depth),
             target=cut(sample.target),
             valid=cut(sample.valid),
-            guidance=guidance.astype(np.float16),
-            baseline=sample.baseline,
+            guidance=cut(sample.guidance[self._channels]),
+            K=K if flip > 0 else mirrored_K(K, columns.stop - columns.start),
         )
+        return self._other_light(crop, rng) if self.vary_light else crop
 
     def _window(
         self, path: Path, size_px: int, least_px: int, rng: np.random.Generator
@@ -208,22 +217,37 @@ class CropSampler:
         own = crop.baseline[:1] if self.config.uses_sources else crop.baseline[1:]
         return own[:, None, None]
 
-    def _other_light(
-        self, guidance: NDArray[np.float32], rng: np.random.Generator
-    ) -> NDArray[np.float32]:
+    def _other_light(self, crop: Sample, rng: np.random.Generator) -> Sample:
         """Another gamma and brightness for all images, and a little for each."""
         names = [name for name in self.config.channels if name != "inverse_depth"]
-        gamma, gain = np.exp(rng.normal(0.0, 0.15)), np.exp(rng.normal(0.0, 0.1))
-        lights: dict[str, NDArray[np.float64]] = {}
+        common = np.exp(rng.normal(0.0, (0.15, 0.1)))
+        # One for all channels of an image.
+        lights: dict[str, NDArray[np.float64]] = collections.defaultdict(
+            lambda: common * np.exp(rng.normal(0.0, 0.05, size=2))
+        )
+        guidance = crop.guidance.copy()
         for index, name in enumerate(names):
             image = "reference" if name in (RED, BLUE) else name
             if image == "reference" or image.startswith("source"):
-                if image not in lights:  # one for all channels of an image
-                    lights[image] = np.exp(rng.normal(0.0, 0.05, size=2))
-                own_gamma, own_gain = lights[image]
-                values = np.clip(guidance[index], 0.0, 1.0) ** (gamma * own_gamma)
-                guidance[index] = np.clip(values * gain * own_gain, 0.0, 1.0)
-        return guidance
+                guidance[index] = _lit(guidance[index], *lights[image])
+        source_gray = _lit(crop.source_gray, *lights["source_0"])
+        return crop._replace(guidance=guidance, source_gray=source_gray)
+
+
+def _lit(values: NDArray[np.float16], gamma: float, gain: float) -> NDArray[np.float16]:
+    lit = np.clip(values.astype(np.float32), 0.0, 1.0) ** np.float32(gamma) * gain
+    return np.asarray(np.clip(lit, 0.0, 1.0), np.float16)
+
+
+def _sight(crop: Sample) -> Sight | None:
+    if not crop.source_gray.size:
+        return None
+    source = SourceTensors(
+        gray=torch.from_numpy(crop.source_gray.astype(np.float32))[None, None],
+        K=torch.from_numpy(crop.source_K)[None],
+        source_from_reference=torch.from_numpy(crop.source_from_reference)[None],
+    )
+    return Sight(torch.from_numpy(crop.K), source)
 
 
 def _stacked(arrays: Sequence[NDArray]) -> Tensor:  # type: ignore[type-arg] # any dtype

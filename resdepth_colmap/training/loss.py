@@ -67,5 +67,6 @@ def refinement_loss(refined: Refinement, batch: Batch, config: TrainConfig) -> L
 def _distance_weight(refined: Refinement, batch: Batch, power: float) -> Tensor:
     """The refined depth over the tile's, to a power; no gradient goes through it."""
     near, far = DISTANCE_RATIOS
-    inverse_ratio = 1.0 + batch.spread * refined.inverse_depth.detach()
+    inverse_depth = batch.scaling.restore(refined.inverse_depth.detach())
+    inverse_ratio = inverse_depth / batch.scaling.offset
     return inverse_ratio.clamp(1.0 / far, 1.0 / near) ** -power

@@ -8,7 +8,7 @@ from torch import Tensor, nn
 from torch.nn.parallel import DistributedDataParallel
 
 from resdepth_colmap.errors import TrainingError
-from resdepth_colmap.network.unet import Refinement, ResDepthNet
+from resdepth_colmap.network.unet import Look, Refinement, ResDepthNet
 from resdepth_colmap.training.crops import Batch
 from resdepth_colmap.training.loss import refinement_loss
 from resdepth_colmap.training.ranks import Ranks
@@ -97,7 +97,7 @@ class Optimisation:
             _freeze_unet(self.network)
         batch = batch.to(self.ranks.device)
         inputs = batch.inputs.contiguous(memory_format=torch.channels_last)
-        loss = refinement_loss(self._refined(inputs), batch, self.config)
+        loss = refinement_loss(self._refined(inputs, batch.look), batch, self.config)
         total, num_known, num_stops = self.ranks.summed(
             [float(loss.total.detach()), float(loss.num_known), float(wants_stop)]
         )
@@ -114,11 +114,11 @@ class Optimisation:
         self.schedule.step()
         return value, num_stops > 0
 
-    def _refined(self, inputs: Tensor) -> Refinement:
+    def _refined(self, inputs: Tensor, look: Look) -> Refinement:
         """The network's output in single precision, whatever it computed with."""
         halved = self.config.precision is Precision.BFLOAT16
         with torch.autocast(inputs.device.type, torch.bfloat16, enabled=halved):
-            inverse_depth, log_scale = self.model(inputs)
+            inverse_depth, log_scale = self.model(inputs, look)
         return Refinement(
             inverse_depth.float(), None if log_scale is None else log_scale.float()
         )

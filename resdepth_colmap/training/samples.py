@@ -12,7 +12,7 @@ import json
 import zipfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 from resdepth_colmap.io.files import write_whole
 from resdepth_colmap.network.network_config import NetworkConfig
 from resdepth_colmap.pipeline.inputs import build_inputs
-from resdepth_colmap.pipeline.kept_depth import FILTERED_SHARE
 from resdepth_colmap.pipeline.progress import Progress, SilentProgress
-from resdepth_colmap.pipeline.refine import view_tensors
+from resdepth_colmap.pipeline.refine import ViewInputs, view_tensors
+from resdepth_colmap.pipeline.source_maps import FILTERED_SHARE
 from resdepth_colmap.scene import DepthMap
 from resdepth_colmap.training.labelled_views import LabelledView, Loaded, labelled_views
 
@@ -34,7 +34,7 @@ DENSE, COMPLETED, HOLES = "-dense", "-completed", "-holes"
 """How the names of samples end: of a map without holes, of one that the maps of other
 views have been compared with, and of a map with holes."""
 
-_FORMAT = 6
+_FORMAT = 7
 
 
 class Sample(NamedTuple):
@@ -47,6 +47,11 @@ class Sample(NamedTuple):
         guidance: The channels of `guidance_names`, shape (C, H, W), float16.
         baseline: Distance to the first source, and what is taken for it by a network
             that sees no source, shape (2,), float32, units.
+        K: K of the view for index coordinates, shape (3, 3), float64, in pixels.
+        source_gray: The first source, in 0..1, shape (Hs, Ws), float16; without pixels
+            where there is none.
+        source_K: Its K, likewise.
+        source_from_reference: Its pose, shape (3, 4), float64, translation in units.
     """
 
     inverse_depth: NDArray[np.float32]
@@ -54,6 +59,10 @@ class Sample(NamedTuple):
     valid: NDArray[np.bool_]
     guidance: NDArray[np.float16]
     baseline: NDArray[np.float32]
+    K: NDArray[np.float64]
+    source_gray: NDArray[np.float16]
+    source_K: NDArray[np.float64]  # noqa: N815 (K is mathematics)
+    source_from_reference: NDArray[np.float64]
 
 
 def guidance_names(num_sources: int) -> tuple[str, ...]:
@@ -111,7 +120,24 @@ def build_sample(loaded: Loaded, num_sources: int, use_maps: bool = True) -> Sam
         valid=stack.valid[0, 0].numpy(),
         guidance=stack.guidance[0].half().numpy(),
         baseline=np.array(baselines, np.float32),
+        K=loaded.inputs.K,
+        **_first_source(loaded.inputs),
     )
+
+
+def _first_source(view: ViewInputs) -> dict[str, NDArray[Any]]:
+    if not view.sources:
+        return {
+            "source_gray": np.zeros((0, 0), np.float16),
+            "source_K": np.eye(3),
+            "source_from_reference": np.eye(3, 4),
+        }
+    source = view.sources[0]
+    return {
+        "source_gray": source.gray.astype(np.float16),
+        "source_K": source.K,
+        "source_from_reference": source.source_from_reference,
+    }
 
 
 def _all_channels(num_sources: int) -> NetworkConfig:

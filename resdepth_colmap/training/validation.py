@@ -115,7 +115,7 @@ def mean_loss(network: ResDepthNet, sampler: CropSampler, config: TrainConfig) -
     total, num_known = 0.0, 0.0
     for index in range(NUM_BATCHES):
         batch = sampler.batch(index).to(device)
-        loss = refinement_loss(network(batch.inputs), batch, config)
+        loss = refinement_loss(network(batch.inputs, batch.look), batch, config)
         total += float(loss.total)
         num_known += float(loss.num_known)
     return total / max(num_known, 1.0)

@@ -3,7 +3,13 @@ import pytest
 import torch
 from torch.nn.functional import grid_sample
 
-from resdepth_colmap.geometry.pixels import cropped_K, index_K, inside_image, to_grid
+from resdepth_colmap.geometry.pixels import (
+    cropped_K,
+    index_K,
+    inside_image,
+    mirrored_K,
+    to_grid,
+)
 from resdepth_colmap.scene import Camera
 
 
@@ -45,3 +51,10 @@ def test_a_crop_sees_the_same_ray_at_the_shifted_pixel() -> None:
     K = np.array([[50.0, 0.0, 31.0], [0.0, 52.0, 20.0], [0.0, 0.0, 1.0]])
     ray = np.linalg.inv(K) @ [12.0, 9.0, 1.0]
     np.testing.assert_allclose(cropped_K(K, 10, 4) @ ray, [2.0, 5.0, 1.0], atol=1e-12)
+
+
+def test_mirroring_twice_is_none_and_the_first_column_becomes_the_last() -> None:
+    K = np.array([[50.0, 0.3, 31.2], [0.0, 52.0, 20.5], [0.0, 0.0, 1.0]])
+    np.testing.assert_allclose(mirrored_K(mirrored_K(K, 64), 64), K)
+    ray = np.linalg.inv(K) @ [0.0, 7.0, 1.0]
+    np.testing.assert_allclose(mirrored_K(K, 64) @ ray, [63.0, 7.0, 1.0], atol=1e-12)

@@ -4,7 +4,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from torch import Tensor
 
-from resdepth_colmap.network.propagation import LARGEST_STEP, STEPS_PX, Propagation
+from resdepth_colmap.network.propagation import (
+    EXTREME_RADIUS_PX,
+    LARGEST_STEP,
+    STEPS_PX,
+    Propagation,
+    extremes,
+)
 
 SIZE_PX = (16, 24)
 
@@ -78,6 +84,28 @@ def test_the_last_candidate_is_the_initial_depth() -> None:
     made = built()
     prefer(made, made.num_candidates - 1)
     torch.testing.assert_close(made(seen, refined, initial).inverse_depth, initial)
+
+
+def test_a_further_depth_is_mixed_too() -> None:
+    seen, refined, initial = maps(4)
+    made = Propagation(num_inputs=3, channels=6, levels=3, num_more=2).eval()
+    more = extremes(refined)
+    for place, expected in enumerate(more):
+        made.head.bias.data.zero_()  # type: ignore[union-attr] # it has one
+        prefer(made, made.num_candidates - 2 + place)
+        actual = made(seen, refined, initial, more).inverse_depth
+        torch.testing.assert_close(actual, expected.clamp(refined - 16, refined + 16))
+    with pytest.raises(ValueError, match="shorter"):
+        made(seen, refined, initial)
+
+
+def test_extremes_are_those_of_the_square_around_each_pixel() -> None:
+    values = maps(5)[1]
+    side = 2 * EXTREME_RADIUS_PX + 1
+    pool = torch.nn.functional.max_pool2d
+    nearest, farthest = extremes(values)
+    assert torch.equal(nearest, pool(values, side, 1, EXTREME_RADIUS_PX))
+    assert torch.equal(farthest, -pool(-values, side, 1, EXTREME_RADIUS_PX))
 
 
 def test_an_outlier_pulls_on_others_by_a_bounded_step() -> None:

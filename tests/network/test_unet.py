@@ -110,6 +110,44 @@ def test_memory_layout_does_not_matter() -> None:
     torch.testing.assert_close(actual, expected, rtol=1e-4, atol=1e-4)
 
 
+def test_the_second_network_looks_at_the_refined_depth_and_the_extremes() -> None:
+    config = small()
+    net = shaken(ResDepthNet(config)).eval()
+    stack, asked = stack_for(config), []
+
+    def look(depths: torch.Tensor) -> torch.Tensor:
+        asked.append(depths)
+        return depths.sin()
+
+    sighted = net(stack, look).inverse_depth
+    (depths,) = asked
+    assert depths.shape == (2, 3, 16, 24)
+    assert not depths.requires_grad
+    assert (depths[:, 1] >= depths[:, 0]).all()
+    assert (depths[:, 2] <= depths[:, 0]).all()
+    net_without = ResDepthNet(small(propagation_channels=0)).eval()
+    net_without.load_state_dict(net.state_dict(), strict=False)
+    refined = net_without(stack).inverse_depth
+    torch.testing.assert_close(depths[:, :1], refined)
+    blind = net(stack).inverse_depth
+    black = net(stack, torch.zeros_like).inverse_depth
+    assert torch.equal(blind, black)
+    assert not torch.allclose(blind, sighted)
+
+
+@pytest.mark.parametrize(
+    "options", [{"variant": "mono"}, {"second_look": False}, {"variant": "depth-only"}]
+)
+def test_without_a_source_or_a_wish_nothing_looks(options: dict[str, object]) -> None:
+    config = small(**options)
+    net = shaken(ResDepthNet(config)).eval()
+
+    def look(depths: torch.Tensor) -> torch.Tensor:
+        raise AssertionError(depths.shape)
+
+    assert torch.isfinite(net(stack_for(config), look).inverse_depth).all()
+
+
 def test_another_number_of_channels_is_refused_by_name() -> None:
     config = small()
     with pytest.raises(ValueError, match="photo_consistency"):

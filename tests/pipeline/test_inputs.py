@@ -21,15 +21,15 @@ from resdepth_colmap.network.network_config import (
 )
 from resdepth_colmap.pipeline.inputs import (
     InputStack,
-    SourceTensors,
     ViewTensors,
     build_inputs,
     initial_maps,
     network_input,
-    photo_consistency,
     tile_scaling,
     warp_sources,
 )
+from resdepth_colmap.pipeline.photo_consistency import photo_consistency
+from resdepth_colmap.pipeline.second_look import SourceTensors
 
 
 def view_of(pair: Pair, num_sources: int = 1, scale: float = 1.0) -> ViewTensors:

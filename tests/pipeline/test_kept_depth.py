@@ -4,12 +4,16 @@ import dataclasses
 
 import numpy as np
 import pytest
+import torch
 from analytic_scene import PLANE_NORMAL, PLANE_OFFSET, depth_of_plane, two_views
 from refined_plane import TILES, expect_error, network, view
 
 from resdepth_colmap.geometry.pixels import index_K
+from resdepth_colmap.pipeline.inputs import ViewTensors, seen_by_sources
+from resdepth_colmap.pipeline.kept_depth import KeptDepth
 from resdepth_colmap.pipeline.refine import ViewInputs, refine_view
-from resdepth_colmap.pipeline.source_maps import SourceMap
+from resdepth_colmap.pipeline.second_look import SourceTensors
+from resdepth_colmap.pipeline.source_maps import SourceMap, start_from
 from resdepth_colmap.scene import DepthMap, cam_from_cam
 
 
@@ -22,20 +26,93 @@ def with_and_without_rule(initial: ViewInputs) -> tuple[DepthMap, DepthMap]:
     return first, second
 
 
-def test_what_the_photographs_confirm_stays_and_outliers_do_not() -> None:
+DISPARITY_PX = 20
+INVERSE_DEPTH = 0.5
+
+
+def facing_wall(texture: float = 1.0, confirmed: bool | None = None) -> ViewTensors:
+    """Two views of a wall of random texture, at its true depth."""
+    rng = np.random.default_rng(0)
+    wall = torch.from_numpy(0.5 + texture * (rng.random((1, 1, 32, 84)) - 0.5)).float()
+    K = torch.tensor([[[100.0, 0.0, 32.0], [0.0, 100.0, 16.0], [0.0, 0.0, 1.0]]])
+    pose = torch.eye(3, 4)[None].clone()
+    pose[..., 0, 3] = DISPARITY_PX / 100.0 / INVERSE_DEPTH
+    depth = torch.full((1, 1, 32, 64), INVERSE_DEPTH)
+    valid = torch.ones_like(depth, dtype=torch.bool)
+    return ViewTensors(
+        inverse_depth=depth,
+        valid=valid,
+        gray=wall[..., DISPARITY_PX:],
+        K=K,
+        sources=(SourceTensors(wall[..., :64], K, pose),),
+        confirmed=None if confirmed is None else valid & confirmed,
+    )
+
+
+def kept_share(view: ViewTensors, change: float, num_errors: float = 1e6) -> float:
+    """Where the source sees it, of a relative change of so many expected errors."""
+    kept = KeptDepth(view, 1, seen_by_sources(view, 1).consistency)
+    error = torch.full_like(view.inverse_depth, abs(change) / num_errors)
+    refined = view.inverse_depth * (1.0 + change)
+    is_kept = kept.is_kept(refined, error * view.inverse_depth)
+    return float(is_kept[..., 4 : -DISPARITY_PX - 8].float().mean())
+
+
+def test_a_small_change_that_the_photographs_contradict_is_not_taken() -> None:
+    assert kept_share(facing_wall(), 0.025) > 0.98
+    assert kept_share(facing_wall(texture=0.0, confirmed=True), 0.025) == 0.0
+    assert kept_share(facing_wall(), 0.1) == 0.0  # the correction of an outlier
+
+
+def test_what_the_photographs_like_better_is_taken_from_any_map() -> None:
+    right = facing_wall(confirmed=True)
+    wrong = right._replace(inverse_depth=right.inverse_depth / 1.025)
+    assert kept_share(wrong, 0.025) == 0.0
+
+
+def test_what_another_map_confirms_stays_within_more_of_the_expected_error() -> None:
+    for texture, confirmed, num_errors in (
+        (1.0, True, 2.0),  # contradicted by the photographs
+        (0.0, True, 1.0),
+        (0.0, False, 0.5),
+        (0.0, None, 0.5),
+    ):
+        wall = facing_wall(texture, confirmed)
+        assert kept_share(wall, 0.1, 0.98 * num_errors) > 0.98
+        assert kept_share(wall, 0.1, 1.02 * num_errors) < 0.02
+
+
+def test_what_a_filter_has_left_stays_though_no_photograph_contradicts() -> None:
+    wall = facing_wall(texture=0.0)
+    assert kept_share(wall, 0.025) == 0.0
+    assert kept_share(wall._replace(is_filtered=True), 0.025) == 1.0
+
+
+def test_a_map_is_filtered_by_its_own_holes_not_by_what_others_deny() -> None:
+    whole = exact_view()
+    holes = whole.depth.copy()
+    holes[::3] = 0.0
+    half_denied = whole.depth.copy()
+    half_denied[:, ::2] *= 0.5
+    for maps in ((), maps_of([1.0])):
+        for depth, expected in (
+            (whole.depth, False),
+            (half_denied, False),
+            (holes, True),
+        ):
+            assert start_from(depth, whole.K, maps).is_filtered == expected
+
+
+def test_outliers_do_not_stay() -> None:
     initial = view()
     exact = depth_of_plane(two_views()[0], PLANE_NORMAL, PLANE_OFFSET)
     wrong = np.zeros(exact.shape, bool)
     wrong[10:20, 10:20] = True
     depth = np.where(wrong, 0.5 * exact, exact).astype(np.float32)
-    initial = dataclasses.replace(initial, depth=depth)
-    with_rule, without = with_and_without_rule(initial)
-    kept = np.isclose(with_rule, depth, rtol=1e-6)
-    changed = ~np.isclose(with_rule, without, rtol=1e-6)
-    assert kept.mean() > 2 * np.isclose(without, depth, rtol=1e-6).mean()
-    # What the rule changed, it set back to the initial depth, by less than 5 %.
-    assert kept[changed].all()
-    assert (np.abs(1 / without - 1 / depth)[changed] < 0.05 / depth[changed]).all()
+    initial = dataclasses.replace(initial, depth=depth, source_maps=maps_of([1.0]))
+    refined = refine_view(initial, network(), TILES).depth
+    assert (refined[wrong] > 0.9 * exact[wrong]).all()
+    np.testing.assert_allclose(refined[~wrong], exact[~wrong], rtol=1e-5)
 
 
 def test_a_hole_is_never_confirmed() -> None:
@@ -88,16 +165,14 @@ def exact_view() -> ViewInputs:
 
 
 def test_what_another_map_confirms_stays() -> None:
-    kept = {}
-    initial = exact_view()
+    kept, net = {}, network(seed=1)
+    expect_error(net, -6.0)
     for factor in (1.0, 1.3):
-        looked = dataclasses.replace(initial, source_maps=maps_of([factor]))
-        with_rule, without = with_and_without_rule(looked)
-        changed = ~np.isclose(without, initial.depth, rtol=1e-4)
-        same = np.isclose(with_rule, initial.depth, rtol=1e-6)
-        kept[factor] = same[changed].mean()
-    assert kept[1.0] > 0.6
-    assert kept[1.3] < 0.05
+        looked = dataclasses.replace(exact_view(), source_maps=maps_of([factor]))
+        refined = refine_view(looked, net, TILES).depth
+        kept[factor] = np.isclose(refined, looked.depth, rtol=1e-6).mean()
+    assert kept[1.0] > 0.3
+    assert kept[1.3] < 0.1
 
 
 def test_what_no_map_confirms_is_completed_before_the_network() -> None:

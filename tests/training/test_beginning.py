@@ -99,8 +99,38 @@ def test_a_propagation_is_added_to_weights_that_have_none(tmp_path: Path) -> Non
         assert torch.equal(network.state_dict()[name], value)
     kept = TrainConfig(init=tmp_path / "with.safetensors")
     save_weights(tmp_path / "with.safetensors", network)
-    with pytest.raises(ConfigError, match="propagation_channels 6, not 9"):
-        chosen_network(kept, {"propagation_channels": 9})
+    with pytest.raises(ConfigError, match="propagation_channels 6, not 3"):
+        chosen_network(kept, {"propagation_channels": 3})
+
+
+def test_a_wider_propagation_that_looks_again_begins_as_the_narrow_one(
+    tmp_path: Path,
+) -> None:
+    torch.manual_seed(5)
+    narrow = dataclasses.replace(NETWORK, propagation_channels=6, second_look=False)
+    old = ResDepthNet(narrow)
+    assert old.propagation is not None
+    torch.nn.init.normal_(old.propagation.head.weight, std=0.3)
+    for value in old.propagation.buffers():
+        if value.ndim:
+            value.uniform_(0.5, 2.0)
+    path = tmp_path / "narrow.safetensors"
+    save_weights(path, old)
+    config = TrainConfig(init=path)
+    options = {"propagation_channels": 9, "second_look": True}
+    wide = fresh_network(chosen_network(config, options), config).eval()
+    assert wide.config.looks_again
+    stack = torch.randn(1, len(NETWORK.channels), 16, 16)
+    expected, actual = load_weights(path)(stack), wide(stack, torch.sin)
+    torch.testing.assert_close(actual.log_scale, expected.log_scale)
+    # The new depths take a little of the weight.
+    change = (actual.inverse_depth - expected.inverse_depth).abs()
+    assert change.mean() < 0.1 * (expected.inverse_depth - stack[:, :1]).abs().mean()
+    wide.train()(stack, torch.sin).inverse_depth.square().sum().backward()
+    for name, parameter in wide.named_parameters():
+        if name.startswith("propagation.stem") and parameter.ndim > 1:
+            assert parameter.grad is not None, name
+            assert parameter.grad.flatten(1).any(dim=1)[:6].all(), name
 
 
 def test_an_input_that_the_weights_know_is_not_taken_away(weights: Path) -> None:

@@ -12,7 +12,7 @@ from noisy_planes import write_noisy_plane
 
 from resdepth_colmap.errors import TrainingError
 from resdepth_colmap.network.network_config import InputVariant, NetworkConfig
-from resdepth_colmap.pipeline.inputs import photo_consistency
+from resdepth_colmap.pipeline.photo_consistency import photo_consistency
 from resdepth_colmap.training import crops
 from resdepth_colmap.training.crops import CropSampler
 from resdepth_colmap.training.samples import prepare_samples, read_sample
@@ -117,7 +117,11 @@ def test_the_share_of_maps_with_holes_is_as_asked(samples: tuple[Path, ...]) -> 
 
 def test_light_changes_photographs_alone(samples: tuple[Path, ...]) -> None:
     plain = sampler_of(samples).batch(0)
-    with mock.patch.object(crops.CropSampler, "_other_light", lambda _, g, __: g * 0):
+    with mock.patch.object(
+        crops.CropSampler,
+        "_other_light",
+        lambda _, c, __: c._replace(guidance=c.guidance * 0),
+    ):
         dark = sampler_of(samples, vary_light=True).batch(0)
     assert (dark.inputs[:, 1:] == 0).all()
     varied = sampler_of(samples, vary_light=True).batch(0)
@@ -156,3 +160,32 @@ def test_a_network_that_looks_at_other_maps_is_mostly_shown_them(
     assert ends[NETWORK]["completed"] > 150 > 60 > ends[NETWORK]["dense"] > 10
     assert set(ends[blind]) == {"dense", "holes"}
     assert ends[blind]["holes"] == ends[NETWORK]["holes"]
+
+
+def test_the_source_that_is_looked_at_again_fits_the_crop(
+    samples: tuple[Path, ...],
+) -> None:
+    """At the true depth it shows what the reference shows, mirrored or not."""
+    batch = sampler_of(samples, batch_size=16).batch(0)
+    names = NETWORK.channels
+    reference = batch.inputs[:, [names.index("reference")]]
+    there = batch.look(batch.target)
+    inside = there > 0
+    middle = (..., slice(4, -4), slice(4, -4))
+    badness = photo_consistency(reference, [(there, inside)])[middle]
+    mirrored = photo_consistency(reference, [(there.flip(-1), inside.flip(-1))])
+    assert float(badness.median()) < 0.1
+    assert float(mirrored[middle].median()) > 0.3
+
+
+def test_light_changes_the_source_alike(samples: tuple[Path, ...]) -> None:
+    plain, lit = (
+        sampler_of(samples, vary_light=vary, holes_share=0.0).batch(0)
+        for vary in (False, True)
+    )
+    place = NETWORK.channels.index("source_0")
+    initial = plain.inputs[:, :1]
+    for batch in (plain, lit):
+        again, stored = batch.look(initial), batch.inputs[:, [place]]
+        torch.testing.assert_close(again.mean(), stored.mean(), rtol=0.02, atol=0)
+    assert not torch.allclose(plain.look(initial), lit.look(initial), atol=0.01)

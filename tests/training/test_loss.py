@@ -7,6 +7,8 @@ import torch
 from torch import Tensor
 
 from resdepth_colmap.network.unet import Refinement
+from resdepth_colmap.pipeline.inputs import Scaling
+from resdepth_colmap.pipeline.second_look import SecondLook
 from resdepth_colmap.training.crops import Batch
 from resdepth_colmap.training.loss import refinement_loss
 from resdepth_colmap.training.train_config import Preset, TrainConfig
@@ -25,7 +27,8 @@ def batch() -> Batch:
         inputs=torch.zeros(SHAPE),
         target=random(0),
         known=random(1) > 0,
-        spread=torch.tensor([0.2, 0.4])[:, None, None, None],
+        scaling=Scaling(*torch.tensor([[1.0, 2.0], [0.2, 0.8]])[..., None, None, None]),
+        second_look=SecondLook((None, None)),
         importance=torch.ones(SHAPE),
         names=("a", "b"),
     )
@@ -94,7 +97,8 @@ def test_the_best_scale_is_the_error(batch: Batch) -> None:
 
 def test_the_logarithm_weighs_small_errors_more(batch: Batch) -> None:
     """Halving a small error gains more, by its size, than halving a large one."""
-    batch = batch._replace(spread=torch.zeros_like(batch.spread))
+    flat = torch.full_like(batch.scaling.scale, 1e-9)
+    batch = batch._replace(scaling=batch.scaling._replace(scale=flat))
     plain = dataclasses.replace(DEFAULT, log_weight=0.0)
 
     def gain(error: float, config: TrainConfig) -> float:
@@ -127,7 +131,8 @@ def test_a_pixel_of_two_surfaces_is_drawn_to_the_likelier(num_far: int) -> None:
         inputs=target,
         target=target,
         known=torch.ones_like(target, dtype=torch.bool),
-        spread=torch.full((1, 1, 1, 1), 0.3),
+        scaling=Scaling(torch.full((1, 1, 1, 1), 2.0), torch.full((1, 1, 1, 1), 0.6)),
+        second_look=SecondLook((None,)),
         importance=torch.ones_like(target),
         names=("a",),
     )
@@ -142,11 +147,12 @@ def test_a_pixel_of_two_surfaces_is_drawn_to_the_likelier(num_far: int) -> None:
 def test_errors_count_in_units_of_length(batch: Batch) -> None:
     """A small error of inverse depth, times the square of the depth."""
     refined = random(6) * 0.5
-    depths = [1.0 / (1.0 + batch.spread * x) for x in (refined, refined + 1e-4)]
+    offset, scale = batch.scaling
+    depths = [offset / (offset + scale * x) for x in (refined, refined + 1e-4)]
     config = dataclasses.replace(DEFAULT, log_weight=0.0)
     batch = batch._replace(target=refined + 1e-4)
     loss = refinement_loss(refined_of(refined), batch, config)
-    lengths = (depths[0] - depths[1]).abs() / batch.spread
+    lengths = (depths[0] - depths[1]).abs() * offset / scale
     torch.testing.assert_close(
         loss.total, lengths[batch.known].sum(), rtol=1e-2, atol=0.0
     )
