@@ -184,7 +184,7 @@ class ResDepthNet(nn.Module):
 
 
 def _seen_again(depths: Tensor, look: Look | None) -> Tensor:
-    """The source at these depths; where it looks is no way for gradients."""
+    """The source at these depths; no gradient goes through where it is looked at."""
     if look is None:
         return torch.zeros_like(depths)
     return look(depths.detach().float()).to(depths.dtype)
