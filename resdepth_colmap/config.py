@@ -192,8 +192,8 @@ class RefineConfig(Config):
             that is the word before ".bin" in its file name.
         passes: How often to warp and refine (the paper's iter: 2).
         keep_confirmed: Keep the initial depth of a pixel where another view's map or
-            the photographs confirm it and the network changes it only a little, or
-            little beside the error that it expects to make.
+            the photographs confirm it and the network changes it only a little, with
+            the photographs against it; or little beside the error that it expects.
         tile_px: Side of a square tile, in pixels.
         overlap_px: Overlap of neighbouring tiles, in pixels.
         device: Where the network runs.
