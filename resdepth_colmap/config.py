@@ -191,6 +191,9 @@ class RefineConfig(Config):
         input: Which maps to start from: auto (the fuller one), or a kind of map,
             that is the word before ".bin" in its file name.
         passes: How often to warp and refine (the paper's iter: 2).
+        rounds: How often all views are refined: from the second round on each sees what
+            the round before has made of the others' maps. One round is all for a
+            network that sees no maps of others.
         keep_confirmed: Keep the initial depth of a pixel where another view's map or
             the photographs confirm it and the network changes it only a little, with
             the photographs against it; or little beside the error that it expects.
@@ -202,6 +205,7 @@ class RefineConfig(Config):
 
     input: str = "auto"
     passes: int = 1
+    rounds: int = 3
     keep_confirmed: bool = True
     tile_px: int = 512
     overlap_px: int = 128
@@ -210,7 +214,9 @@ class RefineConfig(Config):
 
     def __post_init__(self) -> None:
         """Check the ranges once, so that no later code has to."""
-        self._check(1 <= self.passes <= 10, "1 to 10", passes=self.passes)
+        for name in ("passes", "rounds"):
+            value = getattr(self, name)
+            self._check(1 <= value <= 10, "1 to 10", **{name: value})
         self._check(
             self.tile_px >= 32 and self.tile_px % 32 == 0,
             "a multiple of 32",

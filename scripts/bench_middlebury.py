@@ -37,7 +37,7 @@ def run() -> None:
             weights = Path(folder) / "unchanging.safetensors"
             unchanging = NetworkConfig(base_channels=1, propagation_channels=0)
             save_weights(weights, ResDepthNet(unchanging))
-            options = ["--weights", str(weights), *options]
+            options = ["--weights", str(weights), "--rounds", "1", *options]
         command = ["evaluate", "depth", str(scenes)]
         command += ["--output", str(MEASUREMENTS / f"{name}.json"), *options]
         main(command, prog_name="resdepth-colmap")

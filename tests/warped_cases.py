@@ -17,7 +17,7 @@ def difference_when_warped(case: DepthCase, scale: float = 1.0) -> float:
         torch.from_numpy(inverse_depth.astype(np.float64))[None, None],
         torch.from_numpy(case.reference.K)[None],
         torch.from_numpy(source.K)[None],
-        torch.from_numpy(source_from_reference(case, source))[None],
+        torch.from_numpy(source_from_reference(case.reference, source))[None],
     )
     counted = known & inside[0, 0].numpy()
     difference = np.abs(warped[0, 0].numpy() - case.reference.gray)[counted]

@@ -60,7 +60,7 @@ CACHE_NAME = "resdepth-cache"
     default=StereoBackend.AUTO,
     text="Whose PatchMatch: COLMAP's (needs CUDA), or ours on the CPU.",
 )
-@config_options(RefineConfig, "passes", "keep_confirmed", "weights", "device")
+@config_options(RefineConfig, "passes", "rounds", "keep_confirmed", "weights", "device")
 @config_options(StereoConfig, skip=(*NO_MATCHER_OPTIONS, "max_num_sources"))
 @max_residual_option
 @click.option(

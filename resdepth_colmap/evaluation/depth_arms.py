@@ -5,24 +5,18 @@ the plain baseline, and refined depth; residuals beyond a limit are discarded.
 """
 
 import dataclasses
-import time
 from collections.abc import Mapping
 
 import numpy as np
 import numpy.typing as npt
 
 from resdepth_colmap.config import RefineConfig
-from resdepth_colmap.evaluation.depth_case import (
-    DepthCase,
-    InitialDepth,
-    source_from_reference,
-)
+from resdepth_colmap.evaluation.case_refinement import refine_case
+from resdepth_colmap.evaluation.depth_case import DepthCase, InitialDepth
 from resdepth_colmap.evaluation.depth_metrics import median_filtered
 from resdepth_colmap.evaluation.depth_regions import edge_region
 from resdepth_colmap.evaluation.pooled_metrics import ErrorSample
 from resdepth_colmap.network.unet import ResDepthNet
-from resdepth_colmap.pipeline.refine import SourceView, ViewInputs, refine_view
-from resdepth_colmap.pipeline.source_maps import SourceMap
 
 ARMS = ("unfiltered", "median", "refined")
 REGIONS = ("all", "edges", "flat")
@@ -41,7 +35,7 @@ class CaseResult:
         seen_median_relative_error: Median there of error over true depth; likewise.
         megapixels: Size of the view, in millions of pixels.
         matching_cpu_s: Processor seconds of all threads; None if depth was there.
-        refining_cpu_s: Likewise, of all passes.
+        refining_cpu_s: Likewise, of all passes of the last round.
     """
 
     name: str
@@ -67,14 +61,16 @@ def measure_case(
         case: The view and its truth.
         initial: Its initial depth, of the same size.
         network: On the device to run on.
-        config: Passes and tiles.
+        config: Rounds, passes and tiles.
         max_residual: Larger errors, in units, are discarded; None = none is.
     """
     truth, depth = case.truth, initial.depth
-    start = time.process_time()
-    refined = refine_view(_inputs(case, initial), network, config).depth
-    refining_cpu_s = time.process_time() - start
-    arms = {"unfiltered": depth, "median": median_filtered(depth), "refined": refined}
+    refined = refine_case(case, initial, network, config)
+    arms = {
+        "unfiltered": depth,
+        "median": median_filtered(depth),
+        "refined": refined.depth,
+    }
     edges = edge_region(truth)
     regions = {"all": None, "edges": edges, "flat": ~edges}
     seen = case.seen
@@ -94,33 +90,7 @@ def measure_case(
         else _median_relative_error(case, initial, seen),
         megapixels=case.megapixels,
         matching_cpu_s=initial.cpu_s,
-        refining_cpu_s=refining_cpu_s,
-    )
-
-
-def _inputs(case: DepthCase, initial: InitialDepth) -> ViewInputs:
-    return ViewInputs(
-        depth=initial.depth,
-        gray=case.reference.gray,
-        colors=case.colors,
-        K=case.reference.K,
-        sources=tuple(
-            SourceView(
-                gray=source.gray,
-                K=source.K,
-                source_from_reference=source_from_reference(case, source),
-            )
-            for source in case.sources
-        ),
-        source_maps=tuple(
-            SourceMap(
-                depth=depth,
-                K=source.K,
-                source_from_reference=source_from_reference(case, source),
-            )
-            for source, depth in zip(case.sources, initial.source_depths, strict=False)
-            if depth is not None
-        ),
+        refining_cpu_s=refined.cpu_s,
     )
 
 

@@ -43,6 +43,7 @@ class DepthCase:
             known.
         initial: Depth that is there already; None = it has to be matched.
         colors: The reference in colour, RGB, shape (H, W, 3), in 0..1; None = grey.
+        source_colors: The first sources likewise; those beyond the end are grey.
     """
 
     name: str
@@ -53,6 +54,7 @@ class DepthCase:
     seen: npt.NDArray[np.bool_] | None = None
     initial: InitialDepth | None = None
     colors: UnitColors | None = None
+    source_colors: tuple[UnitColors | None, ...] = ()
 
     @property
     def megapixels(self) -> float:
@@ -90,9 +92,8 @@ class SceneSource:
     read: Callable[[CaseOptions], Sequence[LazyCase]]
 
 
-def source_from_reference(case: DepthCase, source: MatchView) -> Matrix:
+def source_from_reference(reference: MatchView, source: MatchView) -> Matrix:
     """The pose of a source, shape (3, 4), in units."""
-    reference_from_world = case.reference.cam_from_world
-    rotation = source.cam_from_world[:, :3] @ reference_from_world[:, :3].T
-    translation = source.cam_from_world[:, 3] - rotation @ reference_from_world[:, 3]
-    return np.column_stack([rotation, translation])
+    rotation = source.cam_from_world[:, :3] @ reference.cam_from_world[:, :3].T
+    moved = rotation @ reference.cam_from_world[:, 3]
+    return np.column_stack([rotation, source.cam_from_world[:, 3] - moved])

@@ -14,7 +14,7 @@ from resdepth_colmap.evaluation.pooled_metrics import ErrorSample, pooled
 Errors = Mapping[str, Mapping[str, ErrorSample]]
 """By region, then by arm."""
 
-_REFINE_OPTIONS = ("passes", "keep_confirmed", "tile_px", "overlap_px")
+_REFINE_OPTIONS = ("passes", "rounds", "keep_confirmed", "tile_px", "overlap_px")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

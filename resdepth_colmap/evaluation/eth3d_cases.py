@@ -39,7 +39,7 @@ from resdepth_colmap.io.images import read_gray, read_unit_colors
 from resdepth_colmap.io.model import read_scene
 from resdepth_colmap.matching.patch_match import MatchView
 from resdepth_colmap.pipeline.view_images import camera_at_scale, resized_image
-from resdepth_colmap.scene import Camera, Scene, View
+from resdepth_colmap.scene import Camera, Scene, UnitColors, View
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -165,10 +165,8 @@ class _SceneReader:
             sources=(self._match_view(source),),
             depth_range=(near, far),
             truth=truth,
-            colors=resized_image(
-                read_unit_colors(self.files.image_path(reference.name)),
-                (camera.width_px, camera.height_px),
-            ),
+            colors=self._colors(reference),
+            source_colors=(self._colors(source),),
         )
 
     def _distorted(self, view: View) -> DistortedView:
@@ -183,6 +181,11 @@ class _SceneReader:
     def _camera(self, view: View) -> Camera:
         longest_px = max(view.camera.width_px, view.camera.height_px)
         return camera_at_scale(view.camera, min(1.0, self.image_width_px / longest_px))
+
+    def _colors(self, view: View) -> UnitColors:
+        camera = self._camera(view)
+        colors = read_unit_colors(self.files.image_path(view.name))
+        return resized_image(colors, (camera.width_px, camera.height_px))
 
     def _match_view(self, view: View) -> MatchView:
         path = self.files.image_path(view.name)

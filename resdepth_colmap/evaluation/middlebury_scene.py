@@ -79,6 +79,7 @@ def read_middlebury_case(path: Path, options: CaseOptions) -> DepthCase:
         truth=depth_from_disparity(disparity, calibration),
         seen=seen,
         colors=read_unit_colors(path / IMAGE_NAMES[0]),
+        source_colors=(read_unit_colors(path / IMAGE_NAMES[1]),),
     )
 
 

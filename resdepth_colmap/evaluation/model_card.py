@@ -48,10 +48,11 @@ def _second_network(network: Mapping[str, Any]) -> str:
     channels = network.get("propagation_channels", 0)
     if not channels:
         return ""
+    seen = " sees the first one's features," if network["shared_features"] else ""
     again = " looks at the second photo again and" if network["second_look"] else ""
     return (
         f", those of a second, small one among them ({channels} channels at half the "
-        f"resolution), which{again} mixes each pixel's depth from those around it"
+        f"resolution), which{seen}{again} mixes each pixel's depth from those around it"
     )
 
 

@@ -255,7 +255,7 @@ def _mean_errors(measured: Measured, key: str) -> dict[str, float | None]:
 
 
 def _ratio_sentence(measured: Measured) -> str:
-    mean, passes = measured["mean"], measured["options"]["refine"]["passes"]
+    mean, options = measured["mean"], measured["options"]["refine"]
     scenes = measured["scenes"].values()
     num_fewer = sum(
         scene["refined"]["bad_2"] < scene["unfiltered"]["bad_2"] for scene in scenes
@@ -267,9 +267,15 @@ def _ratio_sentence(measured: Measured) -> str:
     ]
     return (
         f"Refined over unfiltered, mean of {len(scenes)} scenes, "
-        f"{passes} {'pass' if passes == 1 else 'passes'}: {', '.join(ratios)}; fewer "
+        f"{_times(options)}: {', '.join(ratios)}; fewer "
         f"pixels off by more than 2 % in {num_fewer} of {len(scenes)}."
     )
+
+
+def _times(options: Measured) -> str:
+    passes, rounds = options["passes"], options.get("rounds", 1)
+    said = f"{passes} {'pass' if passes == 1 else 'passes'}"
+    return said if rounds == 1 else f"{rounds} rounds of {said}"
 
 
 def _largest_ratio(measured: Measured, key: str) -> float | None:

@@ -27,7 +27,7 @@ from resdepth_colmap.matching.patch_match import MatchView
 from resdepth_colmap.pipeline.initial_map import candidate_kinds, choose_initial_map
 from resdepth_colmap.pipeline.source_maps import NUM_SOURCE_MAPS
 from resdepth_colmap.pipeline.view_images import ViewImages
-from resdepth_colmap.scene import DepthMap, Scene, View
+from resdepth_colmap.scene import DepthMap, Scene, UnitColors, View
 
 TRUTH_FOLDER = "ground_truth"
 SEEN_SUFFIX = ".nonoccluded.png"
@@ -111,7 +111,15 @@ def _case(
         seen=_seen(workspace, view),
         initial=initial,
         colors=images.colors(view, view.camera),
+        source_colors=_colors(images, scene, sources[:NUM_SOURCE_MAPS]),
     )
+
+
+def _colors(
+    images: ViewImages, scene: Scene, indices: list[int]
+) -> tuple[UnitColors, ...]:
+    views = (scene.views[index] for index in indices)
+    return tuple(images.colors(view, view.camera) for view in views)
 
 
 def _truth(workspace: Workspace, view: View) -> DepthMap:

@@ -55,6 +55,7 @@ class NetworkConfig(Config):
             pixel's depth from those around it (docs/adr/0015); 0 = none.
         second_look: Show that one the first source as it would look at the refined
             depth, at the nearest and at the farthest around it, and let it take these.
+        shared_features: Show that one what the U-Net's last convolution sees, too.
         normalisation: How inverse depth is scaled.
     """
 
@@ -72,6 +73,7 @@ class NetworkConfig(Config):
     confidence: bool = True
     propagation_channels: int = 72
     second_look: bool = True
+    shared_features: bool = True
     normalisation: Normalisation = Normalisation.ROBUST
 
     def __post_init__(self) -> None:
@@ -111,6 +113,7 @@ class NetworkConfig(Config):
             confidence=False,
             propagation_channels=0,
             second_look=False,
+            shared_features=False,
             normalisation=Normalisation.BASELINE,
         )
 
@@ -157,7 +160,9 @@ class NetworkConfig(Config):
         """Names of what the second network sees, in order."""
         said = ["refined", "log_scale"] if self.confidence else ["refined"]
         again = _AGAIN if self.looks_again else ()
-        return (*said, *self.channels, *again)
+        num_features = self.base_channels if self.shared_features else 0
+        features = (f"feature_{index}" for index in range(num_features))
+        return (*said, *self.channels, *again, *features)
 
     @property
     def multiple_px(self) -> int:

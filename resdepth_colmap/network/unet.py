@@ -117,16 +117,17 @@ class ResDepthNet(nn.Module):
             ValueError: For another number of channels or another size.
         """
         self._check(stack)
-        outputs = self.head(self._decode(self._encode(self._squash(stack))))
+        features = self._decode(self._encode(self._squash(stack)))
+        outputs = self.head(features)
         residual = outputs[:, :1]
         if self.config.gate:
             residual = residual * torch.sigmoid(outputs[:, 1:2])
         refined = stack[:, :1] + residual if self.config.residual else residual
         log_scale = outputs[:, -1:] if self.config.confidence else None
-        return self._propagate(stack, Refinement(refined, log_scale), look)
+        return self._propagate(stack, Refinement(refined, log_scale), features, look)
 
     def _propagate(
-        self, stack: Tensor, before: Refinement, look: Look | None
+        self, stack: Tensor, before: Refinement, features: Tensor, look: Look | None
     ) -> Refinement:
         if self.propagation is None:
             return before
@@ -139,6 +140,8 @@ class ResDepthNet(nn.Module):
             more = extremes(before.inverse_depth)
             seen.append(_seen_again(torch.cat([before.inverse_depth, *more], 1), look))
             seen += [depth.clamp(-INPUT_LIMIT, INPUT_LIMIT) for depth in more]
+        if self.config.shared_features:
+            seen.append(features)
         propagated = self.propagation(
             torch.cat(seen, dim=1), before.inverse_depth, stack[:, :1], more
         )

@@ -31,6 +31,7 @@ _OLDER = {
     "color": False,
     "propagation_channels": 0,
     "second_look": False,
+    "shared_features": False,
 }
 """Options that the headers of older files do not name, as those networks were."""
 

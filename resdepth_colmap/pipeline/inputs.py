@@ -46,8 +46,8 @@ class ViewTensors(NamedTuple):
         sources: Second views, best first; may be empty.
         carried: What the depth maps of other views say, shape (B, 1, H, W), in 1/unit;
             0 = nothing. None = there are no such maps.
-        confirmed: Where one of these says the same as the initial depth, shape (B, 1,
-            H, W), bool; likewise.
+        num_confirming: How many of these say the same as the initial depth, shape (B,
+            1, H, W), uint8; likewise.
         colors: RGB values of the reference in 0..1, shape (B, 3, H, W); None = it is
             grey.
         is_filtered: Whether a filter has left its holes, so that what is there is sure.
@@ -59,7 +59,7 @@ class ViewTensors(NamedTuple):
     K: Tensor
     sources: tuple[SourceTensors, ...]
     carried: Tensor | None = None
-    confirmed: Tensor | None = None
+    num_confirming: Tensor | None = None
     colors: Tensor | None = None
     is_filtered: bool = False
 

@@ -27,7 +27,7 @@ CFG_NAMES = ("patch-match.cfg", "fusion.cfg")
 # Measured on two cores with the default options; a guide, no promise.
 MEASURED_CORES = 2
 STEREO_S_PER_MEGAPIXEL_AND_PASS = 16.0  # six sources
-REFINE_S_PER_MEGAPIXEL_AND_PASS = 1.5
+REFINE_S_PER_MEGAPIXEL_AND_PASS = 1.8
 REFINE_BASE_MB = 700.0  # libraries, weights, one tile in the network
 REFINE_MB_PER_MEGAPIXEL = 150.0  # images, warped views and maps of one view
 
@@ -201,10 +201,11 @@ def _estimate(
     matched = backend is StereoBackend.CPU
     pass_s = STEREO_S_PER_MEGAPIXEL_AND_PASS * total * slowness
     stereo_s = pass_s * len(passes_of(stereo)) if matched else 0.0
+    num_passes = refine.passes * refine.rounds
     return Estimate(
         megapixels=total,
         stereo_s=stereo_s,
-        refine_s=REFINE_S_PER_MEGAPIXEL_AND_PASS * refine.passes * total * slowness,
+        refine_s=REFINE_S_PER_MEGAPIXEL_AND_PASS * num_passes * total * slowness,
         memory_mb=REFINE_BASE_MB + REFINE_MB_PER_MEGAPIXEL * largest,
     )
 

@@ -1,4 +1,4 @@
-"""Depth that a network must not change: what was right stays (docs/adr/0006, 0016)."""
+"""Depth that a network must not change: what was right (docs/adr/0006, 0016, 0018)."""
 
 from typing import NamedTuple
 
@@ -16,10 +16,12 @@ CONTRADICTING_CONSISTENCY = 0.05
 KEPT_CHANGE = 0.03
 """Relative change that is no correction of an outlier."""
 
-CONTRADICTED_ERRORS, CONFIRMED_ERRORS, OTHER_ERRORS = 2.0, 1.0, 0.5
+CONTRADICTED_ERRORS = (0.1, 0.5, 4.0)
+OTHER_ERRORS = (0.1, 0.3, 1.0)
 """A depth stays unless it is changed by so many times the error that the network
-expects of its result: what another view's map confirms, if the photographs contradict
-the change and if not; and anything else."""
+expects of its result, if the photographs contradict the change and if not: where no map
+of another view confirms it, where one does, and where several do: two maps that were
+made from the same two photographs often share a mistake."""
 
 
 class KeptDepth(NamedTuple):
@@ -54,9 +56,10 @@ class KeptDepth(NamedTuple):
         changed = view._replace(inverse_depth=refined)
         after = seen_by_sources(changed, self.num_sources).consistency
         is_contradicted = after - self.consistency > CONTRADICTING_CONSISTENCY
-        is_confirmed = torch.zeros_like(view.valid)
-        if view.confirmed is not None:
-            is_confirmed = view.confirmed
+        num_confirming = torch.zeros_like(view.valid, dtype=torch.uint8)
+        if view.num_confirming is not None:
+            num_confirming = view.num_confirming
+        is_confirmed = num_confirming > 0
         if view.is_filtered:
             is_contradicted = is_contradicted | view.valid
             is_supported = view.valid | is_confirmed
@@ -66,9 +69,7 @@ class KeptDepth(NamedTuple):
         relative = torch.where(is_supported & is_contradicted, KEPT_CHANGE, 0.0)
         limit = relative * view.inverse_depth
         if error is not None:
-            confirmed_errors = torch.where(
-                is_contradicted, CONTRADICTED_ERRORS, CONFIRMED_ERRORS
-            )
-            num_errors = torch.where(is_confirmed, confirmed_errors, OTHER_ERRORS)
-            limit = torch.maximum(limit, num_errors * error)
+            rows = error.new_tensor([OTHER_ERRORS, CONTRADICTED_ERRORS])
+            columns = num_confirming.long().clamp(max=len(OTHER_ERRORS) - 1)
+            limit = torch.maximum(limit, rows[is_contradicted.long(), columns] * error)
         return (refined - view.inverse_depth).abs() < limit

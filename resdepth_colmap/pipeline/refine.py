@@ -3,6 +3,7 @@
 import contextlib
 import dataclasses
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import torch
@@ -122,7 +123,7 @@ def refine_view(
     depth that a map of another view confirms is kept, and one that the photographs
     confirm, where the network would change it only a little and the photographs speak
     against it. Nor is a change taken that is small beside the error that the network
-    itself expects (docs/adr/0006 and 0016).
+    itself expects (docs/adr/0006, 0016 and 0018).
 
     Args:
         view: Initial depth, images and poses; sources that the network does not take
@@ -244,8 +245,8 @@ def view_tensors(view: ViewInputs, device: torch.device, use_maps: bool) -> View
             )
             for source in view.sources
         ),
-        carried=None if start.carried is None else _image(start.carried, device),
-        confirmed=None if start.confirmed is None else _mask(start.confirmed, device),
+        carried=_map(start.carried, device),
+        num_confirming=_map(start.num_confirming, device),
         is_filtered=start.is_filtered,
     )
 
@@ -261,6 +262,10 @@ def _colors(colors: UnitColors, device: torch.device) -> Tensor:
 
 def _mask(flags: NDArray[np.bool_], device: torch.device) -> Tensor:
     return torch.from_numpy(flags)[None, None].to(device)
+
+
+def _map(values: NDArray[Any] | None, device: torch.device) -> Tensor | None:
+    return None if values is None else torch.from_numpy(values)[None, None].to(device)
 
 
 def _correlation(tensors: ViewTensors, num_sources: int) -> Tensor:

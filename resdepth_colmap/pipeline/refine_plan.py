@@ -5,7 +5,7 @@ import hashlib
 import importlib.metadata
 import json
 import logging
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -30,14 +30,14 @@ class ViewPlan:
         kinds: The maps to choose from.
         sources: Its second views, best first; () for a network that needs none.
         map_sources: Positions of the views whose depth maps are looked at.
-        fingerprint: A hash of all that its refined map depends on.
+        fingerprints: For each round a hash of all that its refined map depends on.
     """
 
     index: int
     kinds: tuple[str, ...]
     sources: tuple[SourceChoice, ...]
     map_sources: tuple[int, ...]
-    fingerprint: str
+    fingerprints: tuple[str, ...]
 
 
 def plan_views(
@@ -84,11 +84,30 @@ def plan_views(
             kinds=kinds,
             sources=sources[:num_sources],
             map_sources=tuple(choice.index for choice in sources[:num_maps]),
-            fingerprint="",
+            fingerprints=(),
         )
         fingerprint = _fingerprint(workspace, scene, plan, options)
-        plans.append(dataclasses.replace(plan, fingerprint=fingerprint))
+        plans.append(dataclasses.replace(plan, fingerprints=(fingerprint,)))
     return tuple(plans), tuple(skipped)
+
+
+def with_rounds(plans: tuple[ViewPlan, ...], num_rounds: int) -> tuple[ViewPlan, ...]:
+    """The same for so many rounds: each looks at the maps that the one before made.
+
+    Args:
+        plans: As `plan_views` makes them, for one round.
+        num_rounds: At least 1.
+    """
+    for _ in range(num_rounds - 1):
+        before = {plan.index: plan.fingerprints[-1] for plan in plans}
+        plans = tuple(_with_round(plan, before) for plan in plans)
+    return plans
+
+
+def _with_round(plan: ViewPlan, before: Mapping[int, str]) -> ViewPlan:
+    others = [before.get(index) for index in plan.map_sources]
+    fingerprint = _hashed([plan.fingerprints[0], others])
+    return dataclasses.replace(plan, fingerprints=(*plan.fingerprints, fingerprint))
 
 
 def _listed_sources(workspace: Workspace, scene: Scene) -> dict[str, tuple[int, ...]]:
@@ -134,6 +153,10 @@ def _fingerprint(
         "maps": [plan.kinds, _map_stamps(workspace, view.name, plan.kinds)],
         "source_maps": [[_facts_of(v), _map_stamps(workspace, v.name)] for v in others],
     }
+    return _hashed(facts)
+
+
+def _hashed(facts: Any) -> str:
     text = json.dumps(facts, sort_keys=True, default=str)
     return hashlib.sha256(text.encode()).hexdigest()
 

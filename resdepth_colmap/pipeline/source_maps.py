@@ -27,6 +27,8 @@ less than that in its image: with a short baseline, two percent are less than an
 match (COLMAP's geometric consistency allows 1 px there and back)."""
 
 
+Counts = npt.NDArray[np.uint8]
+
 LEAST_CONFIRMED_SHARE = 0.05
 """Maps that confirm less of a map are of another scene, or of failed pairs."""
 
@@ -55,14 +57,15 @@ class Start(NamedTuple):
             W).
         carried: What the maps of other views say, shape (H, W), float32, in 1/unit; 0 =
             nothing. None = there are no maps that are of any use.
-        confirmed: Where one of them says the same as was measured; likewise.
+        num_confirming: How many of them say the same as was measured, shape (H, W);
+            likewise.
         is_filtered: Whether the map has so many holes that it must have been filtered.
     """
 
     inverse_depth: FloatMap
     valid: npt.NDArray[np.bool_]
     carried: FloatMap | None = None
-    confirmed: npt.NDArray[np.bool_] | None = None
+    num_confirming: Counts | None = None
     is_filtered: bool = False
 
 
@@ -86,16 +89,17 @@ def start_from(depth: DepthMap, K: Matrix, maps: Sequence[SourceMap]) -> Start:
     alone = Start(filled, valid, is_filtered=is_filtered)
     if not maps:
         return alone
-    carried, confirms = carried_depth(filled, K, maps)
-    confirmed = valid & confirms
+    carried, counts = carried_depth(filled, K, maps)
+    num_confirming = np.where(valid, counts, np.uint8(0))
+    confirmed = num_confirming > 0
     if confirmed.sum() < LEAST_CONFIRMED_SHARE * valid.sum():
         return alone
     if is_filtered:
         filled, _ = initial_maps(np.where(valid, depth, invert_map(carried)))
-        return Start(filled, valid, carried, confirmed, is_filtered)
+        return Start(filled, valid, carried, num_confirming, is_filtered)
     along_rows = goes_along_rows(maps[0], K, depth.shape)
     completed = complete_from_background(filled, confirmed, along_rows)
-    return Start(completed, confirmed, carried, confirmed)
+    return Start(completed, confirmed, carried, num_confirming)
 
 
 class Carried(NamedTuple):
@@ -104,11 +108,11 @@ class Carried(NamedTuple):
     Attributes:
         inverse_depth: Of several the one nearest to what is there, shape (H, W),
             float32, in 1/unit; 0 where no map says anything.
-        confirms: Where a map says the same as is there, shape (H, W).
+        num_confirming: How many maps say the same as is there, shape (H, W).
     """
 
     inverse_depth: FloatMap
-    confirms: npt.NDArray[np.bool_]
+    num_confirming: Counts
 
 
 def carried_depth(
@@ -123,7 +127,7 @@ def carried_depth(
     """
     height_px, width_px = inverse_depth.shape
     best = np.zeros_like(inverse_depth)
-    confirms = np.zeros(inverse_depth.shape, bool)
+    num_confirming = np.zeros(inverse_depth.shape, np.uint8)
     for source in maps:
         arrived = carry_inverse_depth(
             torch.from_numpy(invert_map(source.depth))[None, None],
@@ -136,8 +140,8 @@ def carried_depth(
         is_nearer = (best == 0) | (change < np.abs(best - inverse_depth))
         best = np.where(is_there & is_nearer, arrived, best)
         limit = np.maximum(CONFIRMING_CHANGE * inverse_depth, _of_pixels(source))
-        confirms |= is_there & (change < limit)
-    return Carried(best, confirms)
+        num_confirming += is_there & (change < limit)
+    return Carried(best, num_confirming)
 
 
 def _of_pixels(source: SourceMap) -> float:

@@ -33,5 +33,5 @@ def test_it_says_the_same_without_its_norms() -> None:
     assert expected.inverse_depth.std() > 0.5
     for name in ("inverse_depth", "log_scale"):
         torch.testing.assert_close(
-            getattr(actual, name), getattr(expected, name), rtol=1e-4, atol=1e-4
+            getattr(actual, name), getattr(expected, name), rtol=1e-3, atol=1e-3
         )

@@ -49,14 +49,14 @@ def map_of(source: View, factor: float = 1.0) -> SourceMap:
 def test_a_right_map_confirms_a_right_depth_and_not_a_wrong_one() -> None:
     reference, source = two_views()
     right = inverse_seen_by(reference)
-    carried, confirms = carried_depth(right, K, [map_of(source)])
+    carried, num_confirming = carried_depth(right, K, [map_of(source)])
     arrived = carried > 0
     assert arrived.mean() > 0.6
-    assert confirms[arrived].mean() > 0.95
+    assert num_confirming[arrived].mean() > 0.95
     np.testing.assert_allclose(carried[arrived], right[arrived], rtol=0.02)
     for factor in (0.8, 1.2):  # more than a pixel
         wrong: FloatMap = (factor * right).astype(np.float32)
-        assert not carried_depth(wrong, K, [map_of(source)]).confirms.any()
+        assert not carried_depth(wrong, K, [map_of(source)]).num_confirming.any()
 
 
 def test_of_several_maps_the_one_that_confirms_counts() -> None:
@@ -64,18 +64,28 @@ def test_of_several_maps_the_one_that_confirms_counts() -> None:
     right = inverse_seen_by(reference)
     maps = [map_of(source, factor) for factor in (0.8, 1.0, 1.3)]
     alone = carried_depth(right, K, [maps[1]])
+    confirmed = alone.num_confirming > 0
     for order in (maps, maps[::-1]):
         together = carried_depth(right, K, order)
-        assert together.confirms[alone.confirms].all()
+        np.testing.assert_array_equal(together.num_confirming, alone.num_confirming)
         change = np.abs(together.inverse_depth - right)
-        assert (change <= np.abs(alone.inverse_depth - right))[alone.confirms].all()
+        assert (change <= np.abs(alone.inverse_depth - right))[confirmed].all()
+
+
+def test_each_map_that_says_the_same_is_counted() -> None:
+    reference, source = two_views()
+    right = inverse_seen_by(reference)
+    once = carried_depth(right, K, [map_of(source)]).num_confirming
+    maps = [map_of(source), map_of(source, 1.3), map_of(source), map_of(source)]
+    counts = carried_depth(right, K, maps).num_confirming
+    np.testing.assert_array_equal(counts, 3 * once)
 
 
 def test_without_maps_nothing_is_said() -> None:
     right = inverse_seen_by(two_views()[0])
-    carried, confirms = carried_depth(right, K, [])
+    carried, num_confirming = carried_depth(right, K, [])
     assert not carried.any()
-    assert not confirms.any()
+    assert not num_confirming.any()
 
 
 @given(st.floats(0.002, 0.1), st.floats(-0.2, 0.2))
@@ -93,7 +103,7 @@ def test_a_pixel_of_the_other_image_is_allowed_however_short_the_baseline(
     found = invert_map((wall / (1 + change)).astype(np.float32))
     moved_px = abs(change) / 4.0 * baseline * CAMERA.fx
     assume(abs(moved_px - 1.0) > 0.01 and abs(abs(change) / (1 + change) - 0.02) > 1e-4)
-    confirms = carried_depth(found, K, [other]).confirms
+    confirms = carried_depth(found, K, [other]).num_confirming > 0
     expected = moved_px < 1.0 or abs(change) / (1 + change) < 0.02
     assert confirms[:, 8:-8].all() == expected
 
@@ -117,8 +127,8 @@ def test_a_map_of_another_size_says_the_same() -> None:
         camera=source.camera.resized(CAMERA.width_px // 2, CAMERA.height_px // 2),
     )
     right = inverse_seen_by(reference)
-    carried, confirms = carried_depth(right, K, [map_of(half)])
-    assert confirms[carried > 0].mean() > 0.95
+    carried, num_confirming = carried_depth(right, K, [map_of(half)])
+    assert num_confirming[carried > 0].mean() > 0.95
 
 
 def test_the_holes_of_a_filtered_map_take_what_other_views_measured() -> None:
@@ -128,12 +138,13 @@ def test_the_holes_of_a_filtered_map_take_what_other_views_measured() -> None:
     holes[10:30, 24:40] = True
     found = np.where(holes, 0, depth)
     start = start_from(found, K, [map_of(source)])
-    seen = carried_depth(inverse_seen_by(reference), K, [map_of(source)]).confirms
+    inverse_depth = inverse_seen_by(reference)
+    seen = carried_depth(inverse_depth, K, [map_of(source)]).num_confirming > 0
     error = np.abs(start.inverse_depth * depth - 1)
     assert error[holes & seen].max() < 0.02
     np.testing.assert_array_equal(start.valid, ~holes)
-    assert start.confirmed is not None
-    assert not start.confirmed[holes].any()
+    assert start.num_confirming is not None
+    assert not start.num_confirming[holes].any()
     np.testing.assert_array_equal(
         start.inverse_depth[~holes], invert_map(found)[~holes]
     )
@@ -144,6 +155,6 @@ def test_maps_of_another_scene_are_not_listened_to() -> None:
     depth = plane_seen_by(reference)
     alone = start_from(depth, K, [])
     start = start_from(depth, K, [map_of(source, 3.0)])
-    assert start.carried is None and start.confirmed is None
+    assert start.carried is None and start.num_confirming is None
     np.testing.assert_array_equal(start.inverse_depth, alone.inverse_depth)
     assert start.valid.all()
