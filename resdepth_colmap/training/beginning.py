@@ -23,6 +23,7 @@ _MORE = (
     "color",
     "propagation_channels",
     "second_look",
+    "shared_features",
 )
 """What a network may have that the weights to start from have not, or have less of."""
 
@@ -49,7 +50,7 @@ def chosen_network(
             variant = options.get("variant", base.variant)
             base = NetworkConfig.paper(InputVariant(variant))
         return NetworkConfig.from_mapping({**base.to_mapping(), **options})
-    path = _path(config.init)
+    path = init_path(config.init)
     theirs = load_weights(path).config
     ours = NetworkConfig.from_mapping({**theirs.to_mapping(), **options})
     _check_fits(path, theirs, ours)
@@ -69,18 +70,24 @@ def fresh_network(network_config: NetworkConfig, config: TrainConfig) -> ResDept
     Raises:
         WeightsError: If the weights to start from cannot be read.
         ConfigError: If they are of another network, or there is no propagation that
-            could be trained alone. One that sees less will do: it begins as blind to
-            the new inputs as it was; so will one with a narrower propagation, or none.
+            could be trained alone, or no first round before others. One that sees
+            less will do: it begins as blind to the new inputs as it was; so will one
+            with a narrower propagation, or none.
     """
     torch.manual_seed(config.seed)
     network = ResDepthNet(network_config)
+    if config.rounds > 1 and (config.init is None or not network_config.source_depth):
+        raise ConfigError(
+            f"{config.rounds=}: there is no network that could do the first round, or "
+            "none that looks at its result; add init and source_depth, or leave it out."
+        )
     if config.freeze_unet and network.propagation is None:
         raise ConfigError(
             "freeze_unet: the network has no propagation, so nothing would be trained; "
             "add propagation_channels, or leave freeze_unet out."
         )
     if config.init is not None:
-        path = _path(config.init)
+        path = init_path(config.init)
         loaded = load_weights(path)
         _check_fits(path, loaded.config, network_config)
         weights = widened(
@@ -90,7 +97,8 @@ def fresh_network(network_config: NetworkConfig, config: TrainConfig) -> ResDept
     return network
 
 
-def _path(init: Path) -> Path:
+def init_path(init: Path) -> Path:
+    """The file that an `init` names."""
     return default_weights_path() if init == SHIPPED else init
 
 

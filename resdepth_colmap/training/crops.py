@@ -19,6 +19,7 @@ from resdepth_colmap.network.network_config import BLUE, RED, NetworkConfig
 from resdepth_colmap.pipeline.inputs import InputStack, Scaling, network_input
 from resdepth_colmap.pipeline.second_look import SecondLook, Sight, SourceTensors
 from resdepth_colmap.training.samples import (
+    AGAIN,
     COMPLETED,
     DENSE,
     HOLES,
@@ -31,6 +32,9 @@ from resdepth_colmap.training.samples import (
 ALONE_SHARE = 0.15
 """Share of crops of a network that looks at the maps of other views for which there are
 none: users may have none."""
+
+AGAIN_SHARE = 0.6
+"""Of the other crops, share of those for which these maps have been refined."""
 
 
 class Batch(NamedTuple):
@@ -142,7 +146,7 @@ class CropSampler:
         """The samples by the end of their names."""
         return {
             end: tuple(path for path in self.paths if path.stem.endswith(end))
-            for end in (DENSE, COMPLETED, HOLES)
+            for end in (DENSE, COMPLETED, AGAIN, HOLES)
         }
 
     @functools.cached_property
@@ -160,13 +164,15 @@ class CropSampler:
         """A sample, and what decides on its crop: the same in every process."""
         rng = np.random.default_rng((self.seed, step, item))
         own = COMPLETED if self.config.source_depth else DENSE
+        again = AGAIN if self.config.source_depth else DENSE
         lot = (rng.random() - self.holes_share) / max(1.0 - self.holes_share, 1e-9)
+        kinds = [own, DENSE, HOLES]
         if lot < 0.0:
-            kinds = (HOLES, own, DENSE)
+            kinds.insert(0, HOLES)
         elif lot < ALONE_SHARE:
-            kinds = (DENSE, own, HOLES)
-        else:
-            kinds = (own, DENSE, HOLES)
+            kinds.insert(0, DENSE)
+        elif lot < ALONE_SHARE + AGAIN_SHARE * (1.0 - ALONE_SHARE):
+            kinds.insert(0, again)
         pool = next(self._pools[kind] for kind in kinds if self._pools[kind])
         return pool[int(rng.integers(len(pool)))], rng
 

@@ -8,7 +8,9 @@ from typing import NamedTuple
 from resdepth_colmap.errors import TrainingError
 from resdepth_colmap.network.network_config import NetworkConfig
 from resdepth_colmap.pipeline.progress import Progress
+from resdepth_colmap.training.beginning import init_path
 from resdepth_colmap.training.crops import CropSampler
+from resdepth_colmap.training.later_rounds import prepare_later_rounds
 from resdepth_colmap.training.ranks import Ranks
 from resdepth_colmap.training.samples import prepare_samples
 from resdepth_colmap.training.scenes import (
@@ -66,6 +68,7 @@ def prepare_data(
     Raises:
         TrainingError: If there is nothing to train on, or a scene is to be trained on
             and to be validated with.
+        WeightsError: If the weights that refine for later rounds cannot be read.
         WorkspaceError: If a workspace is broken, or cannot be matched.
     """
     scenes, watched = find_scenes(places.workspaces), find_scenes(places.validate_on)
@@ -73,11 +76,17 @@ def prepare_data(
     split = split_scenes(scenes, config.validation_share)
     cache = config.samples or places.output / CACHE_FOLDER
 
+    def samples_of(part: Sequence[Path]) -> tuple[Path, ...]:
+        paths = prepare_samples(part, network_config, cache, progress)
+        if config.rounds > 1 and config.init is not None:
+            weights = init_path(config.init)
+            paths += prepare_later_rounds(
+                part, network_config, cache, weights, config.rounds, progress
+            )
+        return tuple(paths)
+
     def make() -> tuple[tuple[Path, ...], ...]:
-        return tuple(
-            tuple(prepare_samples(part, network_config, cache, progress))
-            for part in split
-        )
+        return tuple(samples_of(part) for part in split)
 
     training, held_out = (
         CropSampler(

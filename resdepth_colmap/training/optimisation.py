@@ -50,8 +50,7 @@ class Optimisation:
     ) -> "Optimisation":
         """A training before its first step, on the device of this process."""
         network = network.to(ranks.device)
-        if config.freeze_unet:
-            _freeze_unet(network)
+        _freeze(network, config)
         model: nn.Module = network
         if ranks.count > 1:
             sync_norms(network)
@@ -93,8 +92,7 @@ class Optimisation:
                 the running statistics of the norms.
         """
         self.model.train()
-        if self.config.freeze_unet:
-            _freeze_unet(self.network)
+        _freeze(self.network, self.config)
         batch = batch.to(self.ranks.device)
         inputs = batch.inputs.contiguous(memory_format=torch.channels_last)
         loss = refinement_loss(self._refined(inputs, batch.look), batch, self.config)
@@ -130,11 +128,14 @@ class Optimisation:
             )
 
 
-def _freeze_unet(network: ResDepthNet) -> None:
-    """No gradients but for the propagation, and no change of running statistics."""
-    for name, module in network.named_children():
-        if name != "propagation":
-            module.eval().requires_grad_(False)
+def _freeze(network: ResDepthNet, config: TrainConfig) -> None:
+    """What is not to be trained gets no gradients, and keeps its running statistics."""
+    for module in network.modules():
+        if config.freeze_norms and isinstance(module, nn.BatchNorm2d):
+            module.eval()
+    for name, child in network.named_children():
+        if config.freeze_unet and name != "propagation":
+            child.eval().requires_grad_(False)
 
 
 def _schedule(

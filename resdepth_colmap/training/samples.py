@@ -30,9 +30,10 @@ from resdepth_colmap.training.labelled_views import LabelledView, Loaded, labell
 HOLES_CONSISTENCY = 0.25
 """Photo-consistency above which the copy "with holes" of a map has none."""
 
-DENSE, COMPLETED, HOLES = "-dense", "-completed", "-holes"
+DENSE, COMPLETED, AGAIN, HOLES = "-dense", "-completed", "-again", "-holes"
 """How the names of samples end: of a map without holes, of one that the maps of other
-views have been compared with, and of a map with holes."""
+views have been compared with, of one that their refined maps have been, and of a map
+with holes."""
 
 _FORMAT = 7
 
@@ -96,7 +97,7 @@ def prepare_samples(
         WorkspaceError: If a workspace is broken, or cannot be matched.
     """
     progress = progress or SilentProgress()
-    folder = cache / f"{config.num_sources}-sources"
+    folder = samples_folder(cache, config.num_sources)
     paths: list[Path] = []
     with progress.stage("Preparing samples", len(scenes)) as advance:
         for path in scenes:
@@ -104,6 +105,28 @@ def prepare_samples(
                 paths += _prepare_view(view, config.num_sources, folder)
             advance(1.0)
     return paths
+
+
+def samples_folder(cache: Path, num_sources: int) -> Path:
+    """Where the samples for networks with so many sources lie."""
+    return cache / f"{num_sources}-sources"
+
+
+def sample_path(view: LabelledView, folder: Path, end: str, key: str = "") -> Path:
+    """Where a sample of a view lies: the name changes when what it is made of does.
+
+    Args:
+        view: The view.
+        folder: Of `samples_folder`.
+        end: How its name ends.
+        key: What else it is made of than the view's files.
+    """
+    return folder / f"{view.name}-{_fingerprint(view, key)}{end}.npz"
+
+
+def is_whole(depth: DepthMap) -> bool:
+    """Whether so much of a map is filled that no filter can have been at it."""
+    return bool((depth > 0).mean() >= FILTERED_SHARE)
 
 
 def build_sample(loaded: Loaded, num_sources: int, use_maps: bool = True) -> Sample:
@@ -160,19 +183,19 @@ def sample_size(path: Path) -> tuple[int, int]:
 
 
 def _prepare_view(view: LabelledView, num_sources: int, folder: Path) -> list[Path]:
-    stem = f"{view.name}-{_fingerprint(view)}"
-    paths = {end: folder / f"{stem}{end}.npz" for end in (DENSE, COMPLETED, HOLES)}
+    ends = (DENSE, COMPLETED, HOLES)
+    paths = {end: sample_path(view, folder, end) for end in ends}
     if not paths[HOLES].exists():  # written last
         loaded = view.load(num_sources)
         for end, sample in _samples(loaded, num_sources) if loaded else ():
-            _write_sample(paths[end], sample)
+            write_sample(paths[end], sample)
     return [path for path in paths.values() if path.exists()]
 
 
 def _samples(loaded: Loaded, num_sources: int) -> Iterator[tuple[str, Sample]]:
     """The samples of a view, each with the end of its name, the one with holes last."""
     dense = build_sample(loaded, num_sources, use_maps=False)
-    if dense.valid.mean() < FILTERED_SHARE:
+    if not is_whole(loaded.inputs.depth):
         yield HOLES, build_sample(loaded, num_sources)
         return
     yield DENSE, dense
@@ -185,14 +208,14 @@ def _samples(loaded: Loaded, num_sources: int) -> Iterator[tuple[str, Sample]]:
         yield HOLES, build_sample(loaded._replace(inputs=inputs), num_sources)
 
 
-def _fingerprint(view: LabelledView) -> str:
+def _fingerprint(view: LabelledView, key: str) -> str:
     """Changes when a file that the sample depends on does."""
     image_path = view.workspace.image_path(view.image_name)
     others = view.other_map_paths.values()
     paths = (view.map_path, view.truth_path, image_path, *others)
     states = [(path.stat().st_size, path.stat().st_mtime_ns) for path in paths]
-    key = json.dumps([_FORMAT, str(view.workspace.path.resolve()), states])
-    return hashlib.sha256(key.encode()).hexdigest()[:10]
+    facts = [_FORMAT, str(view.workspace.path.resolve()), states, *([key] * bool(key))]
+    return hashlib.sha256(json.dumps(facts).encode()).hexdigest()[:10]
 
 
 def _with_holes(depth: DepthMap, sample: Sample, num_sources: int) -> DepthMap | None:
@@ -203,7 +226,8 @@ def _with_holes(depth: DepthMap, sample: Sample, num_sources: int) -> DepthMap |
     return kept if (kept > 0).mean() > 0.05 else None
 
 
-def _write_sample(path: Path, sample: Sample) -> None:
+def write_sample(path: Path, sample: Sample) -> None:
+    """Write what `read_sample` reads, whole or not at all."""
     buffer = io.BytesIO()
     np.savez(buffer, **sample._asdict())
     write_whole(path, buffer.getvalue())

@@ -72,6 +72,11 @@ class TrainConfig(Config):
         init: Weights file to start from, with a fresh optimiser; "shipped" = those that
             come with the package. The network is then the file's. None = random ones.
         freeze_unet: Train the propagation alone: the U-Net stays as it begins.
+        freeze_norms: Keep the running statistics of the norms, and normalise by them
+            instead of by those of each batch: a gentler way to go on from good weights.
+        rounds: Learn so many rounds: from 2 on, part of the crops are compared with the
+            maps of other views after the weights to start from have refined these, once
+            or more often.
         samples: Folder of prepared samples, which several trainings may share; None =
             one in the output folder.
     """
@@ -101,6 +106,8 @@ class TrainConfig(Config):
     seed: int = 0
     init: Path | None = None
     freeze_unet: bool = False
+    freeze_norms: bool = False
+    rounds: int = 1
     samples: Path | None = None
 
     def __post_init__(self) -> None:
@@ -163,6 +170,7 @@ _AT_LEAST_ONE = (
     "validation_steps",
     "validation_views",
     "loaders",
+    "rounds",
 )
 _NOT_NEGATIVE = (
     "distance_power",

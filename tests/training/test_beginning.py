@@ -107,7 +107,9 @@ def test_a_wider_propagation_that_looks_again_begins_as_the_narrow_one(
     tmp_path: Path,
 ) -> None:
     torch.manual_seed(5)
-    narrow = dataclasses.replace(NETWORK, propagation_channels=6, second_look=False)
+    narrow = dataclasses.replace(
+        NETWORK, propagation_channels=6, second_look=False, shared_features=False
+    )
     old = ResDepthNet(narrow)
     assert old.propagation is not None
     torch.nn.init.normal_(old.propagation.head.weight, std=0.3)
@@ -117,7 +119,11 @@ def test_a_wider_propagation_that_looks_again_begins_as_the_narrow_one(
     path = tmp_path / "narrow.safetensors"
     save_weights(path, old)
     config = TrainConfig(init=path)
-    options = {"propagation_channels": 9, "second_look": True}
+    options = {
+        "propagation_channels": 9,
+        "second_look": True,
+        "shared_features": True,
+    }
     wide = fresh_network(chosen_network(config, options), config).eval()
     assert wide.config.looks_again
     stack = torch.randn(1, len(NETWORK.channels), 16, 16)
@@ -137,3 +143,11 @@ def test_an_input_that_the_weights_know_is_not_taken_away(weights: Path) -> None
     config = TrainConfig(init=weights)
     with pytest.raises(ConfigError, match="source_depth True, not False"):
         chosen_network(config, {"source_depth": False})
+
+
+def test_a_second_round_needs_a_network_that_did_the_first(weights: Path) -> None:
+    config = TrainConfig(rounds=2)
+    with pytest.raises(ConfigError, match="there is no network that could do"):
+        fresh_network(NETWORK, config)
+    config = TrainConfig(rounds=2, init=weights)
+    assert fresh_network(chosen_network(config, {}), config).config.source_depth

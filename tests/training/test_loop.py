@@ -86,6 +86,22 @@ def test_with_the_unet_frozen_the_propagation_alone_learns(
         assert same != name.startswith("propagation.") or not value.ndim, name
 
 
+def test_frozen_norms_keep_their_statistics_while_weights_change(
+    workspace: Path, tmp_path: Path
+) -> None:
+    first = tmp_path / "first.safetensors"
+    before = fresh_network(NETWORK, TRAINING)
+    torch.nn.init.normal_(before.head.weight, std=0.1)
+    save_weights(first, before)
+    config = dataclasses.replace(TRAINING, init=first, freeze_norms=True)
+    train([workspace], tmp_path / "run", NETWORK, config)
+    begun = load_weights(first).state_dict()
+    ended = load_weights(tmp_path / "run" / "weights.safetensors").state_dict()
+    for name, value in begun.items():
+        is_statistic = "running_" in name or not value.ndim
+        assert torch.equal(ended[name], value) == is_statistic, name
+
+
 def test_the_log_has_a_line_for_each_checkpoint(
     workspace: Path, tmp_path: Path
 ) -> None:
