@@ -36,11 +36,11 @@ from resdepth_colmap.evaluation.matching_surroundings import (
 from resdepth_colmap.geometry.normals import normals_from_depth
 from resdepth_colmap.geometry.pixels import index_K
 from resdepth_colmap.geometry.projection import back_project, project, transform
-from resdepth_colmap.geometry.view_selection import choose_sources
 from resdepth_colmap.io.images import read_gray
 from resdepth_colmap.io.normal_map import read_normal_map
 from resdepth_colmap.io.sparse_points import SparsePoints, read_sparse_points
 from resdepth_colmap.matching.patch_match import MatchView
+from resdepth_colmap.pipeline import stereo_plan
 from resdepth_colmap.scene import DepthMap, GrayImage, NormalMap, View, cam_from_cam
 
 AGREES_WITHIN = 0.02
@@ -248,11 +248,9 @@ def sources_that_see(image: Compared, sources: list[View]) -> npt.NDArray[np.int
 def automatic_sources(room: Room, image: Compared, number: int) -> list[View]:
     """The view's sources as they are chosen by default, the best ones first."""
     scene = room.matched.scene
-    choices = choose_sources(scene, scene.index(image.view.name), len(scene.views))
-    least_deg = StereoConfig().min_triangulation_angle
-    return [
-        scene.views[choice.index] for choice in choices if choice.angle_deg >= least_deg
-    ][:number]
+    place = scene.index(image.view.name)
+    chosen = stereo_plan.automatic_sources(scene, place, number, StereoConfig())
+    return [scene.views[index] for index in chosen]
 
 
 def match_view_of(room: Room, view: View) -> MatchView:

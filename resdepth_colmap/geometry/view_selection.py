@@ -10,6 +10,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+import numpy.typing as npt
 
 from resdepth_colmap.geometry.overlap import overlap
 from resdepth_colmap.scene import Matrix, Scene, View, baseline
@@ -23,6 +24,9 @@ LARGEST_ANGLE_DEG = 75.0
 LEAST_BASELINE_RATIO = 1e-3
 """Baseline over the scene's typical one below which two views stand at one place."""
 
+LEAST_GAIN = 0.05
+"""Share of a view for which a good source is exchanged for a worse one."""
+
 DEPTHS_IN_BASELINES = np.geomspace(1.0, 100.0, 13)
 
 
@@ -33,6 +37,7 @@ class SourceChoice:
     Attributes:
         index: Position in `Scene.views`.
         reason: Why it was chosen, for people.
+        score: How good it is by itself, > 0; compares with those of the same reference.
         num_shared_points: Sparse points that both views see; 0 without sparse points.
         angle_deg: 75th percentile of the triangulation angle at these points; without
             points, the angle between the optical axes.
@@ -41,6 +46,7 @@ class SourceChoice:
 
     index: int
     reason: str
+    score: float
     num_shared_points: int
     angle_deg: float
     baseline: float
@@ -70,9 +76,66 @@ def choose_sources(
     else:
         depths = _likely_depths(scene, reference_index, apart)
         scored = [_by_pose(scene, reference_index, index, depths) for index in apart]
-    scored = [pair for pair in scored if pair[0] > 0]
-    scored.sort(key=lambda pair: (-pair[0], pair[1].index))
-    return tuple(choice for _, choice in scored[:num_sources])
+    scored = [choice for choice in scored if choice.score > 0]
+    scored.sort(key=lambda choice: (-choice.score, choice.index))
+    return tuple(scored[:num_sources])
+
+
+def spread_choices(
+    scene: Scene,
+    reference_index: int,
+    choices: Sequence[SourceChoice],
+    num_sources: int,
+) -> tuple[SourceChoice, ...]:
+    """Those of many choices that are good and together see all of a view, best first.
+
+    The best by themselves may all see the same part of a view, and leave the rest to
+    one or none. So they are exchanged for others, the best exchange first, while that
+    lets much more of the view be seen by two sources, at a sound angle.
+
+    Args:
+        scene: The views and their statistics.
+        reference_index: Position of the reference in `scene.views`.
+        choices: What `choose_sources` says.
+        num_sources: How many to take at most.
+
+    Returns:
+        Up to `num_sources` of the choices, in their order.
+    """
+    taken = list(range(min(num_sources, len(choices))))
+    others = list(range(len(taken), len(choices)))
+    if not taken or not others:
+        return tuple(choices[place] for place in taken)
+    seen = _well_seen(scene, reference_index, [choice.index for choice in choices])
+    while True:
+        number = seen[taken].sum(axis=0)
+        values = np.array(
+            [_value(number - seen[old] + seen[others]) for old in reversed(taken)]
+        )
+        if values.max() - _value(number) <= LEAST_GAIN:
+            return tuple(choices[place] for place in sorted(taken))
+        last, first = np.unravel_index(np.argmax(values), values.shape)
+        old, new = taken[-1 - int(last)], others[int(first)]
+        taken = sorted([*taken, new])
+        taken.remove(old)
+        others = sorted([*others, old])
+        others.remove(new)
+
+
+def _well_seen(
+    scene: Scene, reference: int, indices: Sequence[int]
+) -> npt.NDArray[np.int64]:
+    """Whether views see parts of the reference at a sound angle, 0 or 1, (C, parts)."""
+    depths = _likely_depths(scene, reference, indices)
+    view = scene.views[reference]
+    sightings = [overlap(view, scene.views[index], depths) for index in indices]
+    well = [it.inside & (it.angle_deg >= GOOD_ANGLES_DEG[0]) for it in sightings]
+    return np.stack(well).reshape(len(indices), -1).astype(np.int64)
+
+
+def _value(number: npt.NDArray[np.int64]) -> npt.NDArray[np.float64]:
+    """How much is seen of what two sources might see of each part, in 0..1."""
+    return np.asarray(np.minimum(number, 2).mean(axis=-1) / 2)
 
 
 def _standing_apart(scene: Scene, reference: int, others: Sequence[int]) -> list[int]:
@@ -91,38 +154,36 @@ def _shares_points(scene: Scene, reference: int, others: Sequence[int]) -> bool:
     return shared is not None and any(shared[reference, i] > 0 for i in others)
 
 
-def _by_points(scene: Scene, reference: int, index: int) -> tuple[float, SourceChoice]:
+def _by_points(scene: Scene, reference: int, index: int) -> SourceChoice:
     num_shared, angle_deg = 0, 0.0
     if scene.num_shared_points is not None:
         num_shared = int(scene.num_shared_points[reference, index])
     if scene.triangulation_angle_deg is not None:
         angle_deg = float(scene.triangulation_angle_deg[reference, index])
     reason = f"{num_shared} shared points, {angle_deg:.1f} deg"
-    score = num_shared * float(_angle_weight(np.array(angle_deg)))
-    return score, SourceChoice(
+    return SourceChoice(
         index=index,
         reason=reason,
+        score=num_shared * float(_angle_weight(np.array(angle_deg))),
         num_shared_points=num_shared,
         angle_deg=angle_deg,
         baseline=baseline(scene.views[reference], scene.views[index]),
     )
 
 
-def _by_pose(
-    scene: Scene, reference: int, index: int, depths: Matrix
-) -> tuple[float, SourceChoice]:
+def _by_pose(scene: Scene, reference: int, index: int, depths: Matrix) -> SourceChoice:
     view, other = scene.views[reference], scene.views[index]
     seen = overlap(view, other, depths)
-    score = float((seen.inside * _angle_weight(seen.angle_deg)).mean())
     share = float(seen.inside.mean(axis=1).max())
     angle_deg = _angle_between_axes_deg(view, other)
     reason = (
         f"no sparse points: {100 * share:.0f} % overlap by pose, "
         f"{angle_deg:.1f} deg between axes"
     )
-    return score, SourceChoice(
+    return SourceChoice(
         index=index,
         reason=reason,
+        score=float((seen.inside * _angle_weight(seen.angle_deg)).mean()),
         num_shared_points=0,
         angle_deg=angle_deg,
         baseline=baseline(view, other),

@@ -5,7 +5,11 @@ import logging
 
 from resdepth_colmap.config import StereoConfig
 from resdepth_colmap.geometry.depth_range import depth_range
-from resdepth_colmap.geometry.view_selection import choose_sources
+from resdepth_colmap.geometry.view_selection import (
+    SourceChoice,
+    choose_sources,
+    spread_choices,
+)
 from resdepth_colmap.io.patch_match_cfg import SourceKind, SourceSpec, read_sources
 from resdepth_colmap.io.workspace import Workspace
 from resdepth_colmap.scene import Scene
@@ -82,17 +86,35 @@ def _sources_of(
     limit = config.max_num_sources
     if spec.kind is SourceKind.EXPLICIT:
         return _listed(scene, index, spec.names)[:limit]
-    choices = choose_sources(scene, index, len(scene.views))
     if spec.kind is SourceKind.AUTO:
-        limit = min(limit, spec.num_auto)
+        return automatic_sources(scene, index, limit, config, spec.num_auto)
+    choices = choose_sources(scene, index, len(scene.views))
+    return _places(spread_choices(scene, index, choices, limit))
+
+
+def automatic_sources(
+    scene: Scene,
+    index: int,
+    number: int,
+    config: StereoConfig,
+    num_auto: int = AUTO_SOURCES,
+) -> tuple[int, ...]:
+    """Places of the sources that `__auto__, num_auto` gives a view, best first.
+
+    COLMAP takes the `num_auto` best; ours are up to `number` of these.
+    """
+    choices = [
+        choice
+        for choice in choose_sources(scene, index, len(scene.views))
         # Without shared points there is no such angle, only one between the axes.
-        choices = tuple(
-            choice
-            for choice in choices
-            if not choice.num_shared_points
-            or choice.angle_deg >= config.min_triangulation_angle
-        )
-    return tuple(choice.index for choice in choices[:limit])
+        if not choice.num_shared_points
+        or choice.angle_deg >= config.min_triangulation_angle
+    ]
+    return _places(spread_choices(scene, index, choices[:num_auto], number))
+
+
+def _places(choices: tuple[SourceChoice, ...]) -> tuple[int, ...]:
+    return tuple(choice.index for choice in choices)
 
 
 def _listed(scene: Scene, index: int, names: tuple[str, ...]) -> tuple[int, ...]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from analytic_scene import CAMERA, turned, view_at
 
-from resdepth_colmap.geometry.view_selection import choose_sources
+from resdepth_colmap.geometry.view_selection import choose_sources, spread_choices
 from resdepth_colmap.io.model import read_scene
 from resdepth_colmap.io.workspace import Workspace, open_workspace
 from resdepth_colmap.scene import Scene
@@ -108,6 +108,60 @@ def test_only_candidates_are_chosen_each_once() -> None:
 def test_the_scale_of_the_scene_does_not_matter() -> None:
     small = Scene(views=tuple(view_at((4e-4 * i, 0, 0), CAMERA) for i in range(5)))
     assert chosen(small, reference=2) == chosen(ROW, reference=2)
+
+
+def lookers() -> Scene:
+    """The first looks ahead; three beside it look left and share more, two right."""
+    left, right = turned(0.0, -0.6), turned(0.0, 0.6)
+    poses = [turned(0.0, 0.0), left, left, left, right, right]
+    heights = (0.0, 0.4, 0.5, 0.6, 0.7, 0.8)
+    views = [
+        view_at((0.0, height, 0.0), CAMERA, pose)
+        for height, pose in zip(heights, poses, strict=True)
+    ]
+    num_shared, angle = np.zeros((6, 6), dtype=np.int64), np.zeros((6, 6))
+    num_shared[0] = num_shared[:, 0] = [0, 90, 80, 70, 40, 30]
+    angle[0] = angle[:, 0] = 6.0
+    return Scene(
+        views=tuple(views),
+        num_points=100,
+        num_shared_points=num_shared,
+        triangulation_angle_deg=angle,
+        depth_range=np.tile([2.0, 6.0], (6, 1)),
+    )
+
+
+def spread(scene: Scene, num: int) -> list[int]:
+    choices = choose_sources(scene, 0, len(scene.views))
+    return [choice.index for choice in spread_choices(scene, 0, choices, num)]
+
+
+def test_spread_sources_see_all_of_the_view() -> None:
+    scene = lookers()
+    assert chosen(scene, 3) == [1, 2, 3]
+    for num, num_right in ((3, 1), (4, 2)):  # two see the left of it, if two can
+        assert len(set(spread(scene, num)) & {4, 5}) == num_right
+
+
+def test_all_choices_are_taken_as_they_are_if_they_are_few() -> None:
+    scene = lookers()
+    assert spread(scene, 5) == spread(scene, 9) == chosen(scene, 5)
+    assert spread_choices(scene, 0, (), 3) == ()
+
+
+def test_the_best_stay_where_others_see_nothing_more() -> None:
+    shared = scene_with_points([0, 100, 300, 200, 50], [0, 6, 6, 6, 6])
+    near = tuple(view_at((0.01 * i, 0.4 * i, 0.0), CAMERA) for i in range(5))
+    scene = dataclasses.replace(shared, views=near)
+    assert spread(scene, 2) == chosen(scene, 2) == [2, 3]
+
+
+def test_a_source_too_near_to_tell_depth_sees_nothing() -> None:
+    scene = lookers()
+    views = list(scene.views)
+    for index in (4, 5):  # they look right from where the first one stands
+        views[index] = view_at((0.0, 0.001 * index, 0.0), CAMERA, turned(0.0, 0.6))
+    assert spread(dataclasses.replace(scene, views=tuple(views)), 3) == [1, 2, 3]
 
 
 def scene_of(workspace: Workspace) -> Scene:
