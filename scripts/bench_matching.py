@@ -3,14 +3,15 @@
     python scripts/bench_matching.py [--only PART ...] [--cache FOLDER] [--data FOLDER]
         [--all-photos]
 
-Parts: meeting_room and plant against COLMAP's own maps; chance: how much of what
-confirms them is chance; more_sources: the worst images of meeting_room with 20 sources;
-disagreement and from_theirs: why maps of it differ; middlebury and rendered against the
-truth; speed on noise. Maps are made by the stage `stereo` with default options, in
-workspaces of their own in the cache; finished ones are not made again while the matcher
-finds the same (its METHOD). One thread matches; processor seconds are told, which other
-jobs change little. Each part goes to docs/measurements/matching.json when it is done;
-then `python scripts/make_tables.py` puts the figures into the documents.
+Parts: meeting_room and plant against COLMAP's own maps; left_out: how far those agree
+with each other; chance: how much of what confirms them is chance; more_sources: the
+worst images of meeting_room with 20 sources; disagreement and from_theirs: why maps of
+it differ; middlebury and rendered against the truth; speed on noise. Maps are made by
+the stage `stereo` with default options, in workspaces of their own in the cache;
+finished ones are not made again while the matcher finds the same (its METHOD). One
+thread matches; processor seconds are told, which other jobs change little. Each part
+goes to docs/measurements/matching.json when it is done; then `python
+scripts/make_tables.py` puts the figures into the documents.
 """
 
 import argparse

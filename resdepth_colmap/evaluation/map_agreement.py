@@ -58,8 +58,26 @@ def confirmed(reference: ViewMap, others: Sequence[ViewMap], limit: float) -> Pi
 
 
 def _confirmed_by(reference: ViewMap, other: ViewMap, limit: float) -> Pixels:
-    result = np.zeros(reference.depth.shape, np.bool_)
-    points = back_project(reference.depth, _map_K(reference))[reference.depth > 0]
+    expected, seen = depths_seen(reference, other)
+    return np.asarray((seen > 0) & (np.abs(seen - expected) <= limit * expected))
+
+
+def depths_seen(
+    reference: ViewMap, other: ViewMap
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Which depth a map's points have in another view, and which its map says there.
+
+    Args:
+        reference: The map whose pixels are lifted.
+        other: That in whose nearest pixel each is looked up.
+
+    Returns:
+        Expected and seen depth in the other view, shape (H, W) of the reference; both 0
+        where the reference has no depth, its point lies outside or behind the other
+        view, or that has no depth there.
+    """
+    has_depth = reference.depth > 0
+    points = back_project(reference.depth, _map_K(reference))[has_depth]
     xyz = transform(cam_from_cam(other.view, reference.view), points)
     xy, z = project(xyz, _map_K(other))
     height_px, width_px = other.depth.shape
@@ -67,10 +85,12 @@ def _confirmed_by(reference: ViewMap, other: ViewMap, limit: float) -> Pixels:
     column, row = np.rint(xy.clip(-1e6, 1e6)).astype(np.int64).T
     inside = (z > 0) & (column >= 0) & (column < width_px)
     inside &= (row >= 0) & (row < height_px)
-    seen = np.zeros(len(z))
-    seen[inside] = other.depth[row[inside], column[inside]]
-    result[reference.depth > 0] = (seen > 0) & (np.abs(seen - z) <= limit * z)
-    return result
+    depths = np.zeros(len(z))
+    depths[inside] = other.depth[row[inside], column[inside]]
+    expected, seen = (np.zeros(reference.depth.shape) for _ in range(2))
+    expected[has_depth] = np.where(depths > 0, z, 0.0)
+    seen[has_depth] = depths
+    return expected, seen
 
 
 def _map_K(view_map: ViewMap) -> npt.NDArray[np.float64]:  # noqa: N802

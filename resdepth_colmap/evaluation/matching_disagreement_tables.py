@@ -50,6 +50,25 @@ def chance_parts(part: Measured) -> list[str]:
     ]
 
 
+def left_out_parts(part: Measured) -> list[str]:
+    """What COLMAP's maps and ours say of the pixels that further maps confirm."""
+    of, keys = ("theirs", "ours"), ("agree", "nearer", "farther", "apart")
+    rows = [
+        [name, *[percent(entry[who][key]) for who in of for key in keys]]
+        for name, entry in {**part["maps"], "**mean**": part["mean"]}.items()
+    ]
+    columns = ("within 2 %", "nearer", "farther", "within 2 % of what is not nearer")
+    titles = (f"{who}: {column}" for who in ("COLMAP's", "ours") for column in columns)
+    return [
+        "How far COLMAP's maps agree with each other: of each image the pixels that "
+        "other maps of COLMAP confirm within 1 %, seen in the view of one more map, "
+        "which is left out of them, where that has a depth; what this map of COLMAP "
+        "says there, and our map of the same view at the same pixels (a nearer depth "
+        "may hide the point):",
+        markdown_table(f"image | {' | '.join(titles)}", rows),
+    ]
+
+
 def more_sources_parts(part: Measured) -> list[str]:
     """The images that agree least, before and after."""
     number_of, rows = part["num_sources"], []

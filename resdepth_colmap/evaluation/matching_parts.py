@@ -20,6 +20,7 @@ from resdepth_colmap.evaluation.matched_workspace import (
 from resdepth_colmap.evaluation.matching_chance import measure_chance
 from resdepth_colmap.evaluation.matching_disagreement import measure_disagreement
 from resdepth_colmap.evaluation.matching_from_theirs import measure_from_theirs
+from resdepth_colmap.evaluation.matching_left_out import measure_left_out
 from resdepth_colmap.evaluation.matching_meeting_room import measure_meeting_room
 from resdepth_colmap.evaluation.matching_more_sources import measure_more_sources
 from resdepth_colmap.evaluation.matching_passes import (
@@ -179,6 +180,7 @@ def fused_scores(filtered: MatchedWorkspace) -> Result:
 
 PARTS: dict[str, Callable[[Folders], Result]] = {
     "meeting_room": measure_meeting_room,
+    "left_out": measure_left_out,
     "chance": measure_chance,
     "more_sources": measure_more_sources,
     "disagreement": measure_disagreement,

@@ -15,6 +15,7 @@ from resdepth_colmap.evaluation.matching_disagreement_tables import (
     chance_parts,
     disagreement_parts,
     from_theirs_parts,
+    left_out_parts,
     more_sources_parts,
 )
 
@@ -225,6 +226,7 @@ def _seconds_sentence(part: Measured) -> str:
 
 PARTS = {
     "meeting_room": _meeting_room,
+    "left_out": left_out_parts,
     "chance": chance_parts,
     "more_sources": more_sources_parts,
     "disagreement": disagreement_parts,

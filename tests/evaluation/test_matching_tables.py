@@ -80,6 +80,13 @@ def chance() -> dict[str, Any]:
     return {"maps": {"a.jpg": entry}, "mean": entry}
 
 
+def left_out() -> dict[str, Any]:
+    theirs = {"agree": 0.75, "nearer": 0.125, "farther": 0.125, "apart": 0.857}
+    ours = {"agree": 0.5, "nearer": 0.375, "farther": 0.125, "apart": 0.8}
+    entry = {"theirs": theirs, "ours": ours}
+    return {"maps": {"a.jpg": entry}, "mean": entry}
+
+
 def from_theirs() -> dict[str, Any]:
     entry = {"before": 0.5, "after": 0.75, "stay": 0.25, "return": 0.625}
     return {"num_rows": 120, "maps": {"a.jpg": entry}, "mean": entry}
@@ -92,6 +99,7 @@ def measured() -> dict[str, Any]:
         "command": "python bench.py",
         "date": "2026-01-02",
         "meeting_room": part(mean_twice=MAPS, chance=0.125),
+        "left_out": left_out(),
         "chance": chance(),
         "more_sources": more_sources(),
         "disagreement": disagreement(),
@@ -106,7 +114,7 @@ def measured() -> dict[str, Any]:
 def test_every_table_is_whole() -> None:
     text = matching_table(measured())
     tables = [block for block in text.split("\n\n") if block.startswith("|")]
-    assert len(tables) == 13
+    assert len(tables) == 14
     for table in tables:
         assert len({line.count("|") for line in table.splitlines()}) == 1
 
@@ -179,3 +187,13 @@ def test_what_was_not_measured_is_left_out() -> None:
 def test_chance_is_told_beside_agreement() -> None:
     text = matching_table(measured())
     assert "| **mean** | 75.0 % | 87.5 % | 50.0 % | 25.0 % |" in text
+
+
+def test_what_a_left_out_map_says_stands_beside_what_ours_does() -> None:
+    theirs, ours = (
+        "75.0 % | 12.5 % | 12.5 % | 85.7 %",
+        "50.0 % | 37.5 % | 12.5 % | 80.0 %",
+    )
+    text = matching_table(measured())
+    for name in ("a.jpg", "**mean**"):
+        assert f"| {name} | {theirs} | {ours} |" in text
