@@ -84,12 +84,14 @@ class MemoryPeaks:
 
     Attributes:
         ends_at_once: Whether to raise `Started` at the first progress.
+        whole_mb: The peak in MiB of all steps, and of what came before them.
         tenths_mb: Peaks in MiB, shape (10,); those of the first step are left out.
     """
 
     def __init__(self, ends_at_once: bool) -> None:
         """Nothing is noted yet."""
         self.ends_at_once = ends_at_once
+        self.whole_mb = 0.0
         self.tenths_mb = [0.0] * 10
 
     @contextlib.contextmanager
@@ -101,9 +103,10 @@ class MemoryPeaks:
             nonlocal done
             if self.ends_at_once:
                 raise Started
-            tenth = min(int(10 * done / total), 9)
+            tenth, peak_mb = min(int(10 * done / total), 9), step_peak_mb()
+            self.whole_mb = max(self.whole_mb, peak_mb)
             if done > 0:
-                self.tenths_mb[tenth] = max(self.tenths_mb[tenth], step_peak_mb())
+                self.tenths_mb[tenth] = max(self.tenths_mb[tenth], peak_mb)
             Path("/proc/self/clear_refs").write_text("5")
             done += units
 
@@ -124,7 +127,6 @@ def run_child(workspace: Path, options: dict[str, Any], ends_at_once: bool) -> N
     from resdepth_colmap.io.model import read_scene
     from resdepth_colmap.io.workspace import open_workspace
     from resdepth_colmap.pipeline.stereo import stereo_workspace
-    from resdepth_colmap.pipeline.versions import peak_memory_mb
 
     peaks = MemoryPeaks(ends_at_once)
     opened = open_workspace(workspace)
@@ -133,7 +135,8 @@ def run_child(workspace: Path, options: dict[str, Any], ends_at_once: bool) -> N
         stereo_workspace(
             opened, scene, StereoConfig(**options), StereoBackend.CPU, progress=peaks
         )
-    found = {"whole_memory_mb": peak_memory_mb(), "tenths_mb": peaks.tenths_mb}
+    whole_mb = max(peaks.whole_mb, step_peak_mb())
+    found = {"whole_memory_mb": whole_mb, "tenths_mb": peaks.tenths_mb}
     print(json.dumps(found))
 
 
