@@ -1,13 +1,9 @@
 """Laws of the map that is left out, on maps of a plane that are exact or wrong."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
-from fake_matcher import installed
-from planes import NAMES, write_plane_workspace
+from planes import NAMES
 
-from resdepth_colmap.evaluation import matched_workspace as module
 from resdepth_colmap.evaluation import matching_left_out as left_out_module
 from resdepth_colmap.evaluation.matching_left_out import measure_left_out
 from resdepth_colmap.evaluation.matching_passes import Folders
@@ -17,22 +13,14 @@ from resdepth_colmap.io.workspace import open_workspace
 WRONG = NAMES[1]
 
 
-@pytest.fixture
-def folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Folders:
-    monkeypatch.setattr(module, "warm_up", lambda _: None)
-    installed(monkeypatch)
-    write_plane_workspace(tmp_path / "meeting_room", kinds=("photometric",))
-    return Folders(data=tmp_path, cache=tmp_path / "cache")
-
-
-def made_wrong(folders: Folders, factor: float) -> None:
-    workspace = open_workspace(folders.data / "meeting_room")
+def made_wrong(plane_folders: Folders, factor: float) -> None:
+    workspace = open_workspace(plane_folders.data / "meeting_room")
     path = workspace.depth_map_path(WRONG, "photometric")
     write_depth_map(path, read_depth_map(path) * np.float32(factor))
 
 
-def test_exact_maps_agree_with_what_the_others_confirm(folders: Folders) -> None:
-    result = measure_left_out(folders)
+def test_exact_maps_agree_with_what_the_others_confirm(plane_folders: Folders) -> None:
+    result = measure_left_out(plane_folders)
     assert list(result["maps"]) == list(NAMES)
     for entry in result["maps"].values():
         assert entry["theirs"]["agree"] > 0.99
@@ -41,10 +29,10 @@ def test_exact_maps_agree_with_what_the_others_confirm(folders: Folders) -> None
 
 @pytest.mark.parametrize(("factor", "answer"), [(0.9, "nearer"), (1.1, "farther")])
 def test_a_wrong_map_among_others_is_told_as_what_it_is(
-    folders: Folders, factor: float, answer: str
+    plane_folders: Folders, factor: float, answer: str
 ) -> None:
-    made_wrong(folders, factor)
-    result = measure_left_out(folders)
+    made_wrong(plane_folders, factor)
+    result = measure_left_out(plane_folders)
     theirs = {name: entry["theirs"] for name, entry in result["maps"].items()}
     # No other map confirms the wrong one, and it is one of four that are left out.
     assert WRONG not in theirs
@@ -56,15 +44,15 @@ def test_a_wrong_map_among_others_is_told_as_what_it_is(
 
 
 def test_ours_is_asked_at_the_same_pixels_in_the_same_view(
-    folders: Folders, monkeypatch: pytest.MonkeyPatch
+    plane_folders: Folders, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    workspace = open_workspace(folders.data / "meeting_room")
+    workspace = open_workspace(plane_folders.data / "meeting_room")
     exact = {
         name: read_depth_map(workspace.depth_map_path(name, "photometric"))
         for name in NAMES
     }
-    made_wrong(folders, 1.1)
+    made_wrong(plane_folders, 1.1)
     monkeypatch.setattr(left_out_module, "depth_of", lambda _, name, __: exact[name])
-    for entry in measure_left_out(folders)["maps"].values():
+    for entry in measure_left_out(plane_folders)["maps"].values():
         assert entry["theirs"]["agree"] < 0.85
         assert entry["ours"]["agree"] > 0.99
