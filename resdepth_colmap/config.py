@@ -79,7 +79,8 @@ class StereoConfig(Config):
             0..2; 0 = each pixel for itself, as in COLMAP.
         num_iterations: Red-black sweeps over the image; half as many in the geometric
             pass.
-        max_num_sources: Use at most so many of the sources that patch-match.cfg names.
+        max_num_sources: Use at most so many of the sources that patch-match.cfg names;
+            of automatic ones and of all, good ones that together see the image.
         max_image_size: Longest image side to match at, in pixels; -1 = as it is.
         depth_min: Nearest depth, in workspace units; -1 = from the scene.
         depth_max: Farthest depth, in workspace units; -1 = from the scene.

@@ -113,13 +113,11 @@ def spread_choices(
             [_value(number - seen[old] + seen[others]) for old in reversed(taken)]
         )
         if values.max() - _value(number) <= LEAST_GAIN:
-            return tuple(choices[place] for place in sorted(taken))
+            return tuple(choices[place] for place in taken)
         last, first = np.unravel_index(np.argmax(values), values.shape)
-        old, new = taken[-1 - int(last)], others[int(first)]
-        taken = sorted([*taken, new])
-        taken.remove(old)
-        others = sorted([*others, old])
-        others.remove(new)
+        taken[-1 - last], others[first] = others[first], taken[-1 - last]
+        taken.sort()
+        others.sort()
 
 
 def _well_seen(

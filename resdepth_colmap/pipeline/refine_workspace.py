@@ -14,9 +14,7 @@ from resdepth_colmap.network.device import resolve_device
 from resdepth_colmap.network.inference import for_inference
 from resdepth_colmap.network.network_config import NetworkConfig
 from resdepth_colmap.network.weights import load_weights, weights_hash
-from resdepth_colmap.pipeline.initial_map import (
-    check_maps_exist,
-)
+from resdepth_colmap.pipeline.initial_map import check_maps_exist
 from resdepth_colmap.pipeline.progress import Progress, SilentProgress
 from resdepth_colmap.pipeline.refine_loop import RefineLoop
 from resdepth_colmap.pipeline.refine_plan import Skipped, plan_views, with_rounds

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from analytic_scene import CAMERA, turned, view_at
+from looking_views import lookers
 
 from resdepth_colmap.geometry.view_selection import choose_sources, spread_choices
 from resdepth_colmap.io.model import read_scene
@@ -108,27 +109,6 @@ def test_only_candidates_are_chosen_each_once() -> None:
 def test_the_scale_of_the_scene_does_not_matter() -> None:
     small = Scene(views=tuple(view_at((4e-4 * i, 0, 0), CAMERA) for i in range(5)))
     assert chosen(small, reference=2) == chosen(ROW, reference=2)
-
-
-def lookers() -> Scene:
-    """The first looks ahead; three beside it look left and share more, two right."""
-    left, right = turned(0.0, -0.6), turned(0.0, 0.6)
-    poses = [turned(0.0, 0.0), left, left, left, right, right]
-    heights = (0.0, 0.4, 0.5, 0.6, 0.7, 0.8)
-    views = [
-        view_at((0.0, height, 0.0), CAMERA, pose)
-        for height, pose in zip(heights, poses, strict=True)
-    ]
-    num_shared, angle = np.zeros((6, 6), dtype=np.int64), np.zeros((6, 6))
-    num_shared[0] = num_shared[:, 0] = [0, 90, 80, 70, 40, 30]
-    angle[0] = angle[:, 0] = 6.0
-    return Scene(
-        views=tuple(views),
-        num_points=100,
-        num_shared_points=num_shared,
-        triangulation_angle_deg=angle,
-        depth_range=np.tile([2.0, 6.0], (6, 1)),
-    )
 
 
 def spread(scene: Scene, num: int) -> list[int]:

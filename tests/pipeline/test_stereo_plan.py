@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from looking_views import lookers
 from planes import NAMES
 from workspaces import plane_folder
 
@@ -51,6 +52,21 @@ def test_no_more_sources_than_asked_for(tmp_path: Path) -> None:
     )
     ((plan,), _) = plan_stereo(workspace, scene, StereoConfig(max_num_sources=3))
     assert len(plan.sources) == 3
+
+
+def test_sources_together_see_the_view_whatever_names_them(tmp_path: Path) -> None:
+    workspace, _ = opened(plane_folder(tmp_path, kinds=()))
+    scene, config = lookers(), StereoConfig(max_num_sources=3)
+    name, right = scene.views[0].name, {4, 5}
+    cfg = workspace.stereo_path / "patch-match.cfg"
+    for line in ("__auto__, 20", "__all__"):
+        cfg.write_text(f"{name}\n{line}\n", encoding="utf-8")
+        ((plan,), _) = plan_stereo(workspace, scene, config)
+        assert len(plan.sources) == 3
+        assert len(right & {*plan.sources}) == 1
+    cfg.write_text(f"{name}\n__auto__, 3\n", encoding="utf-8")
+    ((plan,), _) = plan_stereo(workspace, scene, config)
+    assert plan.sources == (1, 2, 3)  # COLMAP would take these
 
 
 def test_a_source_of_too_small_an_angle_is_none(tmp_path: Path) -> None:
