@@ -46,7 +46,7 @@ fix: $(READY)  ## what a tool can mend
 	$(BIN)/ruff format .
 
 bench: $(READY)  ## measure what docs/benchmarks.md reports
-	$(BIN)/python scripts/bench_matching.py --all-photos
+	$(BIN)/python scripts/bench_matching.py
 	$(BIN)/python scripts/bench_stereo_memory.py
 	$(BIN)/python scripts/bench_middlebury.py
 	$(BIN)/python scripts/bench_middlebury.py --without-network

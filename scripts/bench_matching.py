@@ -1,17 +1,13 @@
 """Measure how right the CPU PatchMatch is, and how fast.
 
     python scripts/bench_matching.py [--only PART ...] [--cache FOLDER] [--data FOLDER]
-        [--all-photos]
 
-Parts: meeting_room and plant against COLMAP's own maps; left_out: how far those agree
-with each other; chance: how much of what confirms them is chance; more_sources: the
-worst images of meeting_room with 20 sources; disagreement and from_theirs: why maps of
-it differ; middlebury and rendered against the truth; speed on noise. Maps are made by
-the stage `stereo` with default options, in workspaces of their own in the cache;
-finished ones are not made again while the matcher finds the same (its METHOD). One
-thread matches; processor seconds are told, which other jobs change little. Each part
-goes to docs/measurements/matching.json when it is done; then `python
-scripts/make_tables.py` puts the figures into the documents.
+Parts: plant against COLMAP's own maps; middlebury and rendered against the truth; speed
+on noise. Maps are made by the stage `stereo` with default options, in workspaces of
+their own in the cache; finished ones are not made again while the matcher finds the
+same (its METHOD). One thread matches; processor seconds are told, which other jobs
+change little. Each part goes to docs/measurements/matching.json when it is done; then
+`python scripts/make_tables.py` puts the figures into the documents.
 """
 
 import argparse
@@ -40,11 +36,6 @@ def main() -> None:
     parser.add_argument("--only", choices=PARTS, nargs="+", default=list(PARTS))
     parser.add_argument("--data", type=Path, default=DATA, help="the real data")
     parser.add_argument("--cache", type=Path, default=CACHE, help="maps are kept there")
-    parser.add_argument(
-        "--all-photos",
-        action="store_true",
-        help="match those of meeting_room without maps of COLMAP, too, as sources",
-    )
     parser.add_argument("--output", type=Path, default=RESULT)
     arguments = parser.parse_args()
     output: Path = arguments.output
@@ -57,7 +48,6 @@ def main() -> None:
     folders = Folders(
         data=arguments.data,
         cache=arguments.cache / f"method_{METHOD}",
-        all_photos=arguments.all_photos,
     )
     for name in arguments.only:
         measured = json.loads(output.read_text("utf-8")) if output.exists() else {}

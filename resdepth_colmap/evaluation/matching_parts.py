@@ -17,12 +17,6 @@ from resdepth_colmap.evaluation.matched_workspace import (
     copied_maps,
     matched_workspace,
 )
-from resdepth_colmap.evaluation.matching_chance import measure_chance
-from resdepth_colmap.evaluation.matching_disagreement import measure_disagreement
-from resdepth_colmap.evaluation.matching_from_theirs import measure_from_theirs
-from resdepth_colmap.evaluation.matching_left_out import measure_left_out
-from resdepth_colmap.evaluation.matching_meeting_room import measure_meeting_room
-from resdepth_colmap.evaluation.matching_more_sources import measure_more_sources
 from resdepth_colmap.evaluation.matching_passes import (
     ALL,
     KINDS,
@@ -179,12 +173,6 @@ def fused_scores(filtered: MatchedWorkspace) -> Result:
 
 
 PARTS: dict[str, Callable[[Folders], Result]] = {
-    "meeting_room": measure_meeting_room,
-    "left_out": measure_left_out,
-    "chance": measure_chance,
-    "more_sources": measure_more_sources,
-    "disagreement": measure_disagreement,
-    "from_theirs": measure_from_theirs,
     "middlebury": measure_middlebury,
     "rendered": measure_rendered,
     "plant": measure_plant,

@@ -37,13 +37,10 @@ class Folders:
     Attributes:
         data: The scenes.
         cache: Workspaces of ours.
-        all_photos: Whether photos without maps of COLMAP are matched, too, so that the
-            geometric pass of those with maps has the maps of all their sources.
     """
 
     data: Path
     cache: Path
-    all_photos: bool = False
 
 
 def match_both(

@@ -11,13 +11,6 @@ from resdepth_colmap.evaluation.markdown import (
     number,
     percent,
 )
-from resdepth_colmap.evaluation.matching_disagreement_tables import (
-    chance_parts,
-    disagreement_parts,
-    from_theirs_parts,
-    left_out_parts,
-    more_sources_parts,
-)
 
 Measured = Mapping[str, Any]
 
@@ -55,21 +48,6 @@ def _colmap_parts(title: str, part: Measured) -> list[str]:
         f"{kind}: within {limit}" for kind in KINDS for limit in ("1 %", "2 %", "5 %")
     )
     return [title, markdown_table(header, rows), _seconds_sentence(part)]
-
-
-def _meeting_room(part: Measured) -> list[str]:
-    twice = [percent(part["mean_twice"][kind]["0.02"]) for kind in KINDS]
-    return [
-        *_colmap_parts(
-            "`meeting_room`: pixels of COLMAP's maps that a neighbour's map confirms "
-            "within 1 %, and on how many of them our unfiltered maps agree:",
-            part,
-        ),
-        "How many of these are confirmed by chance: when all depths of a map are made "
-        f"wrong by 5 %, still {percent(part['chance'])} of as many pixels are. Of the "
-        "pixels that at least two of the eleven others confirm, ours agree within 2 % "
-        f"on {twice[0]} (photometric) and {twice[1]} (geometric).",
-    ]
 
 
 def _plant(part: Measured) -> list[str]:
@@ -225,12 +203,6 @@ def _seconds_sentence(part: Measured) -> str:
 
 
 PARTS = {
-    "meeting_room": _meeting_room,
-    "left_out": left_out_parts,
-    "chance": chance_parts,
-    "more_sources": more_sources_parts,
-    "disagreement": disagreement_parts,
-    "from_theirs": from_theirs_parts,
     "middlebury": _middlebury,
     "rendered": _rendered,
     "plant": _plant,

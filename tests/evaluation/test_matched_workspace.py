@@ -9,17 +9,13 @@ from planes import NAMES, write_plane_workspace
 
 from resdepth_colmap.config import StereoConfig
 from resdepth_colmap.evaluation import matched_workspace as module
-from resdepth_colmap.evaluation.map_agreement import shares_within
 from resdepth_colmap.evaluation.matched_workspace import (
     MatchedWorkspace,
     copied_maps,
     linked_maps,
     matched_workspace,
 )
-from resdepth_colmap.evaluation.matching_meeting_room import measure_meeting_room
 from resdepth_colmap.evaluation.matching_parts import stretched_range
-from resdepth_colmap.evaluation.matching_passes import Folders
-from resdepth_colmap.io.depth_map import read_depth_map
 from resdepth_colmap.io.patch_match_cfg import SourceKind, SourceSpec
 
 ALL = SourceSpec(kind=SourceKind.ALL)
@@ -110,25 +106,6 @@ def test_maps_are_linked_whole_and_as_often_as_asked(
     assert files(scene) == before
     write_plane_workspace(tmp_path / "empty", kinds=())
     assert not linked_maps(tmp_path / "empty", matched)
-
-
-def test_agreement_is_counted_where_maps_of_colmap_confirm_each_other(
-    tmp_path: Path,
-) -> None:
-    write_plane_workspace(tmp_path / "meeting_room", kinds=("photometric",))
-    result = measure_meeting_room(Folders(data=tmp_path, cache=tmp_path / "cache"))
-    assert list(result["maps"]) == list(NAMES)
-    colmap = read_depth_map(
-        tmp_path / f"meeting_room/stereo/depth_maps/{NAMES[0]}.photometric.bin"
-    )
-    entry = result["maps"][NAMES[0]]
-    assert 0.5 < entry["pixels"] <= 1
-    # The fake matcher finds a depth of 4 everywhere.
-    flat = np.full_like(colmap, 4)
-    everywhere = shares_within(flat, colmap, colmap > 0, (0.05,))
-    assert entry["geometric"]["0.05"] == pytest.approx(everywhere["0.05"], abs=0.2)
-    means = [maps["geometric"]["0.02"] for maps in result["maps"].values()]
-    assert result["mean"]["geometric"]["0.02"] == pytest.approx(np.mean(means))
 
 
 def test_a_range_of_maps_is_stretched_by_a_quarter() -> None:
