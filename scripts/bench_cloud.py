@@ -25,7 +25,7 @@ from resdepth_colmap.evaluation.cloud_config import CloudConfig
 from resdepth_colmap.evaluation.cloud_files import score_cloud_file
 from resdepth_colmap.evaluation.cloud_tables import SCORES, cloud_table
 from resdepth_colmap.io.point_cloud import PointCloud, write_cloud
-from resdepth_colmap.pipeline.versions import peak_memory_mb, versions
+from resdepth_colmap.versions import peak_memory_mb, versions
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 RESULT = REPOSITORY / "docs" / "measurements" / "cloud.json"

@@ -22,7 +22,7 @@ from resdepth_colmap.evaluation.matching_parts import PARTS
 from resdepth_colmap.evaluation.matching_passes import Folders, rounded
 from resdepth_colmap.evaluation.matching_tables import matching_table
 from resdepth_colmap.matching.patch_match import METHOD
-from resdepth_colmap.pipeline.versions import versions
+from resdepth_colmap.versions import versions
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 RESULT = REPOSITORY / "docs" / "measurements" / "matching.json"

@@ -196,7 +196,7 @@ def measure_start() -> dict[str, float]:
 
 def measure_series(arguments: argparse.Namespace, keep: Keep) -> None:
     """Run after run of a size; each is kept when it is done."""
-    from resdepth_colmap.pipeline.versions import versions
+    from resdepth_colmap.versions import versions
 
     width_px, height_px = arguments.size
     words = ["--size", *map(str, arguments.size), "--views", *map(str, arguments.views)]

@@ -42,7 +42,6 @@ from resdepth_colmap.network.unet import ResDepthNet
 from resdepth_colmap.network.weights import load_weights
 from resdepth_colmap.pipeline.initial_map import choose_initial_map
 from resdepth_colmap.pipeline.refine import ViewInputs, refine_view
-from resdepth_colmap.pipeline.versions import versions
 from resdepth_colmap.scene import DepthMap
 from resdepth_colmap.training.labelled_views import labelled_views
 from resdepth_colmap.training.loop import train
@@ -53,6 +52,7 @@ from resdepth_colmap.training.scenes import (
     split_scenes,
 )
 from resdepth_colmap.training.train_config import Preset, Schedule, TrainConfig
+from resdepth_colmap.versions import versions
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 RESULTS = REPOSITORY / "docs" / "measurements"

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import Progress
 
-    from resdepth_colmap.pipeline.progress import Advance
+    from resdepth_colmap.progress import Advance
 
 LEVELS = (logging.ERROR, logging.WARNING, logging.INFO, logging.DEBUG)
 USUAL = 2  # index of INFO

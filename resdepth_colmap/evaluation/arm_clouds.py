@@ -25,7 +25,7 @@ from resdepth_colmap.pipeline.consistency import FuseStatistics
 from resdepth_colmap.pipeline.fuse import fuse_maps
 from resdepth_colmap.pipeline.fuse_colmap import fuse_with_colmap
 from resdepth_colmap.pipeline.fuse_view import MapFiles
-from resdepth_colmap.pipeline.progress import Progress
+from resdepth_colmap.progress import Progress
 from resdepth_colmap.scene import Scene
 
 NO_POINTS = "no point survived the fusion: all scores are 0"

@@ -11,7 +11,7 @@ from resdepth_colmap.evaluation.cloud_scores import (
 )
 from resdepth_colmap.io.ply_points import read_ply_points
 from resdepth_colmap.io.scan_alignment import read_scan_alignment
-from resdepth_colmap.pipeline.progress import Progress
+from resdepth_colmap.progress import Progress
 
 
 def score_cloud_file(

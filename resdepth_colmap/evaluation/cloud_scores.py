@@ -19,7 +19,7 @@ from resdepth_colmap.evaluation.cloud_config import CloudConfig
 from resdepth_colmap.evaluation.completeness import completeness_levels
 from resdepth_colmap.evaluation.laser_scan import sort_scan
 from resdepth_colmap.evaluation.voxel_mean import VoxelGrids
-from resdepth_colmap.pipeline.progress import Progress, SilentProgress
+from resdepth_colmap.progress import Progress, SilentProgress
 
 logger = logging.getLogger(__name__)
 

@@ -31,8 +31,8 @@ from resdepth_colmap.io.model import read_scene
 from resdepth_colmap.io.output import OutputWorkspace
 from resdepth_colmap.io.sparse_points import read_sparse_points
 from resdepth_colmap.io.workspace import check_images, open_workspace
-from resdepth_colmap.pipeline.progress import Progress, SilentProgress
 from resdepth_colmap.pipeline.view_images import ViewImages
+from resdepth_colmap.progress import Progress, SilentProgress
 from resdepth_colmap.scene import Scene
 
 IMAGE_CACHE_BYTES = 256 << 20

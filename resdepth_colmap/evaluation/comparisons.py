@@ -10,8 +10,8 @@ from resdepth_colmap.evaluation.compare_config import CompareConfig
 from resdepth_colmap.evaluation.comparison import CloudTruth, compare_workspace
 from resdepth_colmap.evaluation.depth_scenes import distinct_names
 from resdepth_colmap.evaluation.measures import MEASURES
-from resdepth_colmap.pipeline.progress import Progress
-from resdepth_colmap.pipeline.versions import versions
+from resdepth_colmap.progress import Progress
+from resdepth_colmap.versions import versions
 
 
 def compare_workspaces(

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
-from resdepth_colmap.pipeline.progress import Advance
+from resdepth_colmap.progress import Advance
 
 _POINTS_AT_ONCE = 1 << 18
 

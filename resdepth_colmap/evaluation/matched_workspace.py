@@ -20,9 +20,9 @@ from resdepth_colmap.io.patch_match_cfg import (
     write_patch_match_cfg,
 )
 from resdepth_colmap.io.workspace import Workspace, open_workspace
-from resdepth_colmap.pipeline.progress import Progress, SilentProgress
 from resdepth_colmap.pipeline.stereo import stereo_workspace
 from resdepth_colmap.pipeline.stereo_warm_up import warm_up
+from resdepth_colmap.progress import Progress, SilentProgress
 from resdepth_colmap.scene import Scene
 
 SHARED = ("images", "sparse", "ground_truth")

@@ -36,7 +36,7 @@ from resdepth_colmap.io.patch_match_cfg import SourceKind, SourceSpec
 from resdepth_colmap.io.workspace import open_workspace
 from resdepth_colmap.pipeline.fuse_colmap import fuse_with_colmap
 from resdepth_colmap.pipeline.fuse_view import MapFiles
-from resdepth_colmap.pipeline.progress import SilentProgress
+from resdepth_colmap.progress import SilentProgress
 from resdepth_colmap.scene import DepthMap
 
 FIRST_IMAGE, SECOND_IMAGE = "im0.png", "im1.png"

@@ -23,7 +23,7 @@ from resdepth_colmap.geometry.projection import back_project, project, transform
 from resdepth_colmap.io.depth_map import read_depth_map
 from resdepth_colmap.io.workspace import Workspace
 from resdepth_colmap.pipeline.initial_map import check_map_size
-from resdepth_colmap.pipeline.progress import Progress
+from resdepth_colmap.progress import Progress
 from resdepth_colmap.scene import DepthMap, Matrix, Scene, View
 
 Points = npt.NDArray[np.float32]

@@ -19,9 +19,9 @@ from resdepth_colmap.evaluation.witnesses import (
 )
 from resdepth_colmap.geometry.view_selection import choose_sources
 from resdepth_colmap.io.sparse_points import SparsePoints
-from resdepth_colmap.pipeline.progress import Progress
 from resdepth_colmap.pipeline.view_images import ViewImages, nearest_resized
 from resdepth_colmap.pipeline.view_inputs import view_inputs
+from resdepth_colmap.progress import Progress
 from resdepth_colmap.scene import DepthMap, Scene
 
 NUM_NEIGHBOURS = 4

@@ -16,7 +16,7 @@ from resdepth_colmap.io.output import OutputWorkspace, write_record
 from resdepth_colmap.io.workspace import Workspace
 from resdepth_colmap.pipeline.export_config import REFINED, MapFormat
 from resdepth_colmap.pipeline.initial_map import map_path
-from resdepth_colmap.pipeline.progress import Progress, SilentProgress
+from resdepth_colmap.progress import Progress, SilentProgress
 from resdepth_colmap.scene import DepthMap
 
 SCALE_NAME = "depth_scale.json"

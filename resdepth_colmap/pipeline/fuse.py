@@ -26,7 +26,7 @@ from resdepth_colmap.pipeline.consistency import (
 from resdepth_colmap.pipeline.fuse_colmap import fuse_with_colmap
 from resdepth_colmap.pipeline.fuse_view import LazyViews, MapFiles
 from resdepth_colmap.pipeline.initial_map import map_path
-from resdepth_colmap.pipeline.progress import Progress, SilentProgress
+from resdepth_colmap.progress import Progress, SilentProgress
 from resdepth_colmap.scene import Scene
 
 MOST_NEIGHBOURS = 12

@@ -8,7 +8,7 @@ from resdepth_colmap.io.output import OutputWorkspace
 from resdepth_colmap.io.point_cloud import check_cloud_path, write_cloud
 from resdepth_colmap.io.workspace import open_workspace
 from resdepth_colmap.pipeline.fuse import fuse_workspace
-from resdepth_colmap.pipeline.progress import Progress
+from resdepth_colmap.progress import Progress
 
 
 def cloud_path(output: OutputWorkspace, cloud_format: str) -> Path:

@@ -26,8 +26,8 @@ from resdepth_colmap.pipeline.depth_colors import (
 )
 from resdepth_colmap.pipeline.depth_strip import BeforeAfter, depth_strip, filled_share
 from resdepth_colmap.pipeline.initial_map import map_path
-from resdepth_colmap.pipeline.progress import Progress
 from resdepth_colmap.pipeline.refine_workspace import RefineReport
+from resdepth_colmap.progress import Progress
 from resdepth_colmap.scene import ColorImage, DepthMap, Scene
 
 FOLDER = "pictures"

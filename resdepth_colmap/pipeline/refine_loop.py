@@ -17,11 +17,11 @@ from resdepth_colmap.pipeline.initial_map import (
     candidate_kinds,
     choose_initial_map,
 )
-from resdepth_colmap.pipeline.progress import Progress
 from resdepth_colmap.pipeline.refine import RefinedView, refine_view
 from resdepth_colmap.pipeline.refine_plan import ViewPlan
 from resdepth_colmap.pipeline.view_images import ViewImages
 from resdepth_colmap.pipeline.view_inputs import view_inputs
+from resdepth_colmap.progress import Progress
 from resdepth_colmap.scene import DepthMap, Scene
 
 IMAGE_CACHE_BYTES = 1 << 28  # the next view's sources are often those of this one

@@ -15,10 +15,10 @@ from resdepth_colmap.network.inference import for_inference
 from resdepth_colmap.network.network_config import NetworkConfig
 from resdepth_colmap.network.weights import load_weights, weights_hash
 from resdepth_colmap.pipeline.initial_map import check_maps_exist
-from resdepth_colmap.pipeline.progress import Progress, SilentProgress
 from resdepth_colmap.pipeline.refine_loop import RefineLoop
 from resdepth_colmap.pipeline.refine_plan import Skipped, plan_views, with_rounds
 from resdepth_colmap.pipeline.source_maps import NUM_SOURCE_MAPS
+from resdepth_colmap.progress import Progress, SilentProgress
 from resdepth_colmap.scene import Scene
 
 logger = logging.getLogger(__name__)

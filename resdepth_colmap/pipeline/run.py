@@ -19,12 +19,12 @@ from resdepth_colmap.network.device import resolve_device
 from resdepth_colmap.network.weights import load_weights
 from resdepth_colmap.pipeline.fuse import fuse_initial, fuse_workspace
 from resdepth_colmap.pipeline.fuse_to_file import cloud_before_path, cloud_path
-from resdepth_colmap.pipeline.progress import Progress, SilentProgress
 from resdepth_colmap.pipeline.refine_workspace import RefineReport, refine_workspace
 from resdepth_colmap.pipeline.run_config import RunConfig
 from resdepth_colmap.pipeline.stereo import StereoReport, stereo_workspace
-from resdepth_colmap.pipeline.versions import peak_memory_mb, versions
+from resdepth_colmap.progress import Progress, SilentProgress
 from resdepth_colmap.scene import Scene
+from resdepth_colmap.versions import peak_memory_mb, versions
 
 logger = logging.getLogger(__name__)
 

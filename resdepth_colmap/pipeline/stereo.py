@@ -7,7 +7,6 @@ from resdepth_colmap.config import StereoBackend, StereoConfig
 from resdepth_colmap.errors import BackendUnavailableError, WorkspaceError
 from resdepth_colmap.io.masks import check_masks
 from resdepth_colmap.io.workspace import Workspace
-from resdepth_colmap.pipeline.progress import Progress, SilentProgress
 from resdepth_colmap.pipeline.stereo_colmap import run_colmap
 from resdepth_colmap.pipeline.stereo_ledger import Fingerprints, StereoLedger
 from resdepth_colmap.pipeline.stereo_passes import (
@@ -17,6 +16,7 @@ from resdepth_colmap.pipeline.stereo_passes import (
 )
 from resdepth_colmap.pipeline.stereo_plan import StereoPlan, plan_stereo
 from resdepth_colmap.pipeline.stereo_warm_up import warm_up
+from resdepth_colmap.progress import Progress, SilentProgress
 from resdepth_colmap.scene import Scene
 
 logger = logging.getLogger(__name__)

@@ -24,7 +24,6 @@ from resdepth_colmap.io.workspace import Workspace
 from resdepth_colmap.matching.filtering import filter_result
 from resdepth_colmap.matching.patch_match import MatchView, Surface, match_view
 from resdepth_colmap.pipeline.depth_sketch import SIDE_PX, WIDE, sketched_range
-from resdepth_colmap.pipeline.progress import Advance
 from resdepth_colmap.pipeline.stereo_ledger import (
     GEOMETRIC,
     PHOTOMETRIC,
@@ -33,6 +32,7 @@ from resdepth_colmap.pipeline.stereo_ledger import (
 )
 from resdepth_colmap.pipeline.stereo_plan import StereoPlan
 from resdepth_colmap.pipeline.view_images import ViewImages, camera_at_scale
+from resdepth_colmap.progress import Advance
 from resdepth_colmap.scene import Camera, DepthMap, NormalMap, Scene, View
 
 BYTES_PER_GB = 1 << 30  # COLMAP's unit of cache_size

@@ -7,9 +7,9 @@ from pathlib import Path
 from resdepth_colmap.errors import FusionError
 from resdepth_colmap.io.output import OutputWorkspace, read_record, write_record
 from resdepth_colmap.io.workspace import open_workspace
-from resdepth_colmap.pipeline.progress import Progress
 from resdepth_colmap.pipeline.run import RunResult, run_refine
 from resdepth_colmap.pipeline.run_config import RunConfig
+from resdepth_colmap.progress import Progress
 from resdepth_colmap.report.write_report import write_report
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from resdepth_colmap.errors import TrainingError
 from resdepth_colmap.network.network_config import NetworkConfig
-from resdepth_colmap.pipeline.progress import Progress
+from resdepth_colmap.progress import Progress
 from resdepth_colmap.training.beginning import init_path
 from resdepth_colmap.training.crops import CropSampler
 from resdepth_colmap.training.later_rounds import prepare_later_rounds

@@ -14,7 +14,7 @@ from resdepth_colmap.errors import TrainingError
 from resdepth_colmap.io.images import write_png
 from resdepth_colmap.network.network_config import NetworkConfig
 from resdepth_colmap.pipeline.depth_strip import BeforeAfter, depth_strip
-from resdepth_colmap.pipeline.progress import Advance, Progress, SilentProgress
+from resdepth_colmap.progress import Advance, Progress, SilentProgress
 from resdepth_colmap.training.beginning import fresh_network
 from resdepth_colmap.training.checkpoint import (
     BEST_NAME,

@@ -12,7 +12,7 @@ from resdepth_colmap.evaluation.true_cloud import DepthTruth, read_depth_truth
 from resdepth_colmap.io.depth_map import write_depth_map
 from resdepth_colmap.io.model import read_scene
 from resdepth_colmap.io.workspace import open_workspace
-from resdepth_colmap.pipeline.progress import SilentProgress
+from resdepth_colmap.progress import SilentProgress
 from resdepth_colmap.scene import DepthMap
 
 

@@ -17,8 +17,8 @@ from resdepth_colmap.io.depth_map import read_depth_map, write_depth_map
 from resdepth_colmap.io.output import read_record
 from resdepth_colmap.io.point_cloud import read_cloud
 from resdepth_colmap.io.workspace import open_workspace
-from resdepth_colmap.pipeline.progress import Advance
 from resdepth_colmap.pipeline.refine_workspace import RefineReport, refine_workspace
+from resdepth_colmap.progress import Advance
 
 
 def refine(

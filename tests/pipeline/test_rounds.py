@@ -16,11 +16,11 @@ from resdepth_colmap.io.depth_map import read_depth_map, write_depth_map
 from resdepth_colmap.io.model import read_scene
 from resdepth_colmap.io.workspace import open_workspace
 from resdepth_colmap.network.weights import load_weights, save_weights
-from resdepth_colmap.pipeline.progress import Advance
 from resdepth_colmap.pipeline.refine import refine_view
 from resdepth_colmap.pipeline.refine_workspace import RefineReport, refine_workspace
 from resdepth_colmap.pipeline.view_images import ViewImages
 from resdepth_colmap.pipeline.view_inputs import view_inputs
+from resdepth_colmap.progress import Advance
 from resdepth_colmap.scene import DepthMap
 
 CONFIG = RefineConfig(tile_px=64, overlap_px=16, keep_confirmed=False)

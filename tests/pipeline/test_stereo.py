@@ -19,12 +19,12 @@ from resdepth_colmap.io.depth_map import read_depth_map, write_depth_map
 from resdepth_colmap.io.model import read_scene
 from resdepth_colmap.io.workspace import Workspace, open_workspace
 from resdepth_colmap.pipeline import stereo_ledger, stereo_passes
-from resdepth_colmap.pipeline.progress import Advance, SilentProgress
 from resdepth_colmap.pipeline.stereo import (
     StereoReport,
     choose_backend,
     stereo_workspace,
 )
+from resdepth_colmap.progress import Advance, SilentProgress
 from resdepth_colmap.scene import Scene
 
 CPU = StereoBackend.CPU

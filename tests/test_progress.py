@@ -2,7 +2,7 @@
 
 import pytest
 
-from resdepth_colmap.pipeline.progress import Progress, SilentProgress
+from resdepth_colmap.progress import Progress, SilentProgress
 
 
 def test_silence_accepts_any_report_and_says_nothing(
