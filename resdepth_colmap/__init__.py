@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from resdepth_colmap.config import FuseConfig, RefineConfig, StereoConfig
     from resdepth_colmap.errors import ResDepthError
-    from resdepth_colmap.io.workspace import Workspace, open_workspace
+    from resdepth_colmap.io.colmap.workspace import Workspace, open_workspace
     from resdepth_colmap.network.weights import load_weights
     from resdepth_colmap.pipeline.fuse import fuse_workspace
     from resdepth_colmap.pipeline.refine import SourceView, ViewInputs, refine_view

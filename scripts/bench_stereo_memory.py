@@ -124,8 +124,8 @@ def step_peak_mb() -> float:
 def run_child(workspace: Path, options: dict[str, Any], ends_at_once: bool) -> None:
     """Match a workspace in this process and print its peaks of memory."""
     from resdepth_colmap.config import StereoBackend, StereoConfig
-    from resdepth_colmap.io.model import read_scene
-    from resdepth_colmap.io.workspace import open_workspace
+    from resdepth_colmap.io.colmap.model import read_scene
+    from resdepth_colmap.io.colmap.workspace import open_workspace
     from resdepth_colmap.pipeline.stereo import stereo_workspace
 
     peaks = MemoryPeaks(ends_at_once)

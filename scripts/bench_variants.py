@@ -31,7 +31,7 @@ from resdepth_colmap.evaluation.matched_workspace import linked_maps, matched_wo
 from resdepth_colmap.evaluation.tables import HARDWARE
 from resdepth_colmap.evaluation.variant_errors import arm_errors, arm_summaries
 from resdepth_colmap.evaluation.variant_tables import beyond_table, variants_table
-from resdepth_colmap.io.depth_map import write_depth_map
+from resdepth_colmap.io.colmap.depth_map import write_depth_map
 from resdepth_colmap.io.files import link_or_copy
 from resdepth_colmap.network.network_config import (
     InputVariant,

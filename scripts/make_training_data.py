@@ -20,8 +20,8 @@ def make_room(output: Path, seed: int) -> str:
     """Render one room, and match all of its views."""
     from resdepth_colmap.config import StereoBackend, StereoConfig, SynthesisConfig
     from resdepth_colmap.errors import WorkspaceError
-    from resdepth_colmap.io.model import read_scene
-    from resdepth_colmap.io.workspace import open_workspace
+    from resdepth_colmap.io.colmap.model import read_scene
+    from resdepth_colmap.io.colmap.workspace import open_workspace
     from resdepth_colmap.pipeline.stereo import stereo_workspace
     from resdepth_colmap.training.synthesize import synthesize
 

@@ -14,10 +14,10 @@ from planes import (
     write_model,
 )
 
-from resdepth_colmap.io.depth_map import write_depth_map
-from resdepth_colmap.io.output import OutputWorkspace, write_record
+from resdepth_colmap.io.colmap.depth_map import write_depth_map
+from resdepth_colmap.io.colmap.output import OutputWorkspace, write_record
+from resdepth_colmap.io.colmap.workspace import open_workspace
 from resdepth_colmap.io.point_cloud import PointCloud, write_cloud
-from resdepth_colmap.io.workspace import open_workspace
 from resdepth_colmap.scene import DepthMap
 
 TOO_FAR = 1.05

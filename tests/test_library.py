@@ -13,7 +13,7 @@ USE = """
 from pathlib import Path
 import numpy as np
 from resdepth_colmap.io.images import read_rgb, write_png
-from resdepth_colmap.io.model import read_scene
+from resdepth_colmap.io.colmap.model import read_scene
 path = Path({folder!r}) / "picture.png"
 write_png(path, np.full((8, 8, 3), 7, np.uint8))
 assert (read_rgb(path) == 7).all()

@@ -40,7 +40,7 @@ def export(workspace: Path, kind: MapFormat, maps: str, output: Path) -> None:
     The path of each file is printed. Files of the same name are replaced.
     """
     from resdepth_colmap.cli.log import BarProgress
-    from resdepth_colmap.io.workspace import open_workspace
+    from resdepth_colmap.io.colmap.workspace import open_workspace
     from resdepth_colmap.pipeline.export import export_maps
 
     opened = open_workspace(workspace)

@@ -32,8 +32,8 @@ def info(workspace: Path, as_json: bool, **values: Any) -> None:
     refine = build_config(RefineConfig, values)
     stereo = build_config(StereoConfig, values)
     from resdepth_colmap.cli.printed import show_inspection
-    from resdepth_colmap.io.model import read_scene
-    from resdepth_colmap.io.workspace import open_workspace
+    from resdepth_colmap.io.colmap.model import read_scene
+    from resdepth_colmap.io.colmap.workspace import open_workspace
     from resdepth_colmap.pipeline.inspect import inspect_workspace
 
     opened = open_workspace(workspace)

@@ -45,8 +45,8 @@ def stereo(
     """
     config = build_config(StereoConfig, values)
     from resdepth_colmap.cli.log import BarProgress
-    from resdepth_colmap.io.model import read_scene
-    from resdepth_colmap.io.workspace import check_images, open_workspace
+    from resdepth_colmap.io.colmap.model import read_scene
+    from resdepth_colmap.io.colmap.workspace import check_images, open_workspace
     from resdepth_colmap.pipeline.stereo import stereo_workspace
 
     opened = open_workspace(workspace)

@@ -15,12 +15,12 @@ from resdepth_colmap.evaluation.arm_maps import confident_depth
 from resdepth_colmap.evaluation.arms import Arm
 from resdepth_colmap.geometry.normals import normals_from_depth
 from resdepth_colmap.geometry.pixels import index_K
-from resdepth_colmap.io.depth_map import write_depth_map
+from resdepth_colmap.io.colmap.depth_map import write_depth_map
+from resdepth_colmap.io.colmap.normal_map import write_normal_map
+from resdepth_colmap.io.colmap.output import OutputWorkspace
+from resdepth_colmap.io.colmap.workspace import Workspace
 from resdepth_colmap.io.files import link_or_copy
-from resdepth_colmap.io.normal_map import write_normal_map
-from resdepth_colmap.io.output import OutputWorkspace
 from resdepth_colmap.io.point_cloud import PointCloud
-from resdepth_colmap.io.workspace import Workspace
 from resdepth_colmap.pipeline.consistency import FuseStatistics
 from resdepth_colmap.pipeline.fuse import fuse_maps
 from resdepth_colmap.pipeline.fuse_colmap import fuse_with_colmap

@@ -8,9 +8,9 @@ import numpy as np
 
 from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.evaluation.compare_config import CompareConfig
-from resdepth_colmap.io.depth_map import read_depth_map
-from resdepth_colmap.io.output import OutputWorkspace
-from resdepth_colmap.io.workspace import Workspace, original_map_path
+from resdepth_colmap.io.colmap.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.output import OutputWorkspace
+from resdepth_colmap.io.colmap.workspace import Workspace, original_map_path
 from resdepth_colmap.pipeline.fuse_view import MapFiles
 from resdepth_colmap.pipeline.initial_map import check_map_size, map_path
 from resdepth_colmap.pipeline.source_maps import FILTERED_SHARE

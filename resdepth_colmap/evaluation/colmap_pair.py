@@ -10,13 +10,13 @@ import pycolmap
 from resdepth_colmap.config import StereoConfig
 from resdepth_colmap.errors import BackendUnavailableError
 from resdepth_colmap.geometry.pixels import CENTER_PX
-from resdepth_colmap.io.depth_map import read_depth_map
-from resdepth_colmap.io.files import write_whole
-from resdepth_colmap.io.patch_match_cfg import (
+from resdepth_colmap.io.colmap.cfg import (
     SourceKind,
     SourceSpec,
     write_patch_match_cfg,
 )
+from resdepth_colmap.io.colmap.depth_map import read_depth_map
+from resdepth_colmap.io.files import write_whole
 from resdepth_colmap.io.png import encode_png
 from resdepth_colmap.matching.patch_match import MatchView
 from resdepth_colmap.scene import DepthMap

@@ -27,10 +27,10 @@ from resdepth_colmap.evaluation.view_witnesses import (
     Witnesses,
     measure_views,
 )
-from resdepth_colmap.io.model import read_scene
-from resdepth_colmap.io.output import OutputWorkspace
-from resdepth_colmap.io.sparse_points import read_sparse_points
-from resdepth_colmap.io.workspace import check_images, open_workspace
+from resdepth_colmap.io.colmap.model import read_scene
+from resdepth_colmap.io.colmap.output import OutputWorkspace
+from resdepth_colmap.io.colmap.sparse_points import read_sparse_points
+from resdepth_colmap.io.colmap.workspace import check_images, open_workspace
 from resdepth_colmap.pipeline.view_images import ViewImages
 from resdepth_colmap.progress import Progress, SilentProgress
 from resdepth_colmap.scene import Scene

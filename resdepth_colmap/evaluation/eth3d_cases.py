@@ -28,6 +28,7 @@ from resdepth_colmap.evaluation.eth3d_truth import undistorted_truth
 from resdepth_colmap.evaluation.paper import PAPER_IMAGE_WIDTH_PX, PAPER_ROWS
 from resdepth_colmap.geometry.depth_range import depth_range
 from resdepth_colmap.geometry.pixels import index_K
+from resdepth_colmap.io.colmap.model import read_scene
 from resdepth_colmap.io.distorted_camera import DistortedView, read_distorted_views
 from resdepth_colmap.io.eth3d import (
     DISTORTED,
@@ -36,7 +37,6 @@ from resdepth_colmap.io.eth3d import (
     find_eth3d_scenes,
 )
 from resdepth_colmap.io.images import read_gray, read_unit_colors
-from resdepth_colmap.io.model import read_scene
 from resdepth_colmap.matching.patch_match import MatchView
 from resdepth_colmap.pipeline.view_images import camera_at_scale, resized_image
 from resdepth_colmap.scene import Camera, Scene, UnitColors, View

@@ -12,14 +12,14 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from resdepth_colmap.config import StereoBackend, StereoConfig
-from resdepth_colmap.io.files import write_whole
-from resdepth_colmap.io.model import read_scene
-from resdepth_colmap.io.patch_match_cfg import (
+from resdepth_colmap.io.colmap.cfg import (
     SourceSpec,
     write_fusion_cfg,
     write_patch_match_cfg,
 )
-from resdepth_colmap.io.workspace import Workspace, open_workspace
+from resdepth_colmap.io.colmap.model import read_scene
+from resdepth_colmap.io.colmap.workspace import Workspace, open_workspace
+from resdepth_colmap.io.files import write_whole
 from resdepth_colmap.pipeline.stereo import stereo_workspace
 from resdepth_colmap.pipeline.stereo_warm_up import warm_up
 from resdepth_colmap.progress import Progress, SilentProgress

@@ -30,10 +30,10 @@ from resdepth_colmap.evaluation.matching_passes import (
 from resdepth_colmap.evaluation.matching_speed import measured_speed
 from resdepth_colmap.evaluation.true_cloud import read_depth_truth
 from resdepth_colmap.evaluation.workspace_cases import SEEN_SUFFIX, TRUTH_FOLDER
-from resdepth_colmap.io.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.cfg import SourceKind, SourceSpec
+from resdepth_colmap.io.colmap.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.workspace import open_workspace
 from resdepth_colmap.io.images import read_gray
-from resdepth_colmap.io.patch_match_cfg import SourceKind, SourceSpec
-from resdepth_colmap.io.workspace import open_workspace
 from resdepth_colmap.pipeline.fuse_colmap import fuse_with_colmap
 from resdepth_colmap.pipeline.fuse_view import MapFiles
 from resdepth_colmap.progress import SilentProgress

@@ -12,9 +12,9 @@ from typing import Any
 from resdepth_colmap.config import StereoConfig
 from resdepth_colmap.evaluation.map_agreement import mean_of
 from resdepth_colmap.evaluation.matched_workspace import MatchedWorkspace
-from resdepth_colmap.io.depth_map import read_depth_map
-from resdepth_colmap.io.patch_match_cfg import SourceKind, SourceSpec
-from resdepth_colmap.io.workspace import Workspace
+from resdepth_colmap.io.colmap.cfg import SourceKind, SourceSpec
+from resdepth_colmap.io.colmap.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.workspace import Workspace
 from resdepth_colmap.scene import DepthMap
 
 logger = logging.getLogger(__name__)

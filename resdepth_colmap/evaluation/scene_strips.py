@@ -22,8 +22,8 @@ from resdepth_colmap.evaluation.workspace_cases import (
     TRUTH_FOLDER,
     read_workspace_cases,
 )
-from resdepth_colmap.io.depth_map import write_depth_map
-from resdepth_colmap.io.workspace import open_workspace
+from resdepth_colmap.io.colmap.depth_map import write_depth_map
+from resdepth_colmap.io.colmap.workspace import open_workspace
 from resdepth_colmap.matching.patch_match import MatchView
 from resdepth_colmap.pipeline.pictures import FOLDER, draw_workspace
 from resdepth_colmap.pipeline.refine_workspace import refine_workspace

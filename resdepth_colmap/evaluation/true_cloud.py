@@ -20,8 +20,8 @@ from resdepth_colmap.evaluation.voxel_mean import VoxelGrids
 from resdepth_colmap.evaluation.workspace_cases import TRUTH_FOLDER
 from resdepth_colmap.geometry.pixels import index_K
 from resdepth_colmap.geometry.projection import back_project, project, transform
-from resdepth_colmap.io.depth_map import read_depth_map
-from resdepth_colmap.io.workspace import Workspace
+from resdepth_colmap.io.colmap.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.workspace import Workspace
 from resdepth_colmap.pipeline.initial_map import check_map_size
 from resdepth_colmap.progress import Progress
 from resdepth_colmap.scene import DepthMap, Matrix, Scene, View

@@ -5,8 +5,8 @@ from collections.abc import Mapping
 
 from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.evaluation.depth_metrics import DepthMetrics, depth_metrics
-from resdepth_colmap.io.depth_map import read_depth_map
-from resdepth_colmap.io.output import OutputWorkspace
+from resdepth_colmap.io.colmap.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.output import OutputWorkspace
 from resdepth_colmap.pipeline.initial_map import map_path
 
 

@@ -18,7 +18,7 @@ from resdepth_colmap.evaluation.witnesses import (
     sparse_points,
 )
 from resdepth_colmap.geometry.view_selection import choose_sources
-from resdepth_colmap.io.sparse_points import SparsePoints
+from resdepth_colmap.io.colmap.sparse_points import SparsePoints
 from resdepth_colmap.pipeline.view_images import ViewImages, nearest_resized
 from resdepth_colmap.pipeline.view_inputs import view_inputs
 from resdepth_colmap.progress import Progress

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from resdepth_colmap.evaluation.arm_maps import ViewMaps
 from resdepth_colmap.evaluation.tile_sums import TileSums
 from resdepth_colmap.geometry.projection import pixel_rays, project, transform
-from resdepth_colmap.io.sparse_points import SparsePoints
+from resdepth_colmap.io.colmap.sparse_points import SparsePoints
 from resdepth_colmap.scene import DepthMap, Matrix, cam_from_cam
 
 Flags = npt.NDArray[np.bool_]

@@ -18,11 +18,11 @@ from resdepth_colmap.geometry.depth_range import depth_range
 from resdepth_colmap.geometry.pixels import index_K
 from resdepth_colmap.geometry.resize import nearest_depth
 from resdepth_colmap.geometry.view_selection import choose_sources
-from resdepth_colmap.io.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.cfg import SourceKind, read_sources
+from resdepth_colmap.io.colmap.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.model import read_scene
+from resdepth_colmap.io.colmap.workspace import Workspace, check_images, open_workspace
 from resdepth_colmap.io.images import read_gray
-from resdepth_colmap.io.model import read_scene
-from resdepth_colmap.io.patch_match_cfg import SourceKind, read_sources
-from resdepth_colmap.io.workspace import Workspace, check_images, open_workspace
 from resdepth_colmap.matching.patch_match import MatchView
 from resdepth_colmap.pipeline.initial_map import candidate_kinds, choose_initial_map
 from resdepth_colmap.pipeline.source_maps import NUM_SOURCE_MAPS

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.io.reconstruction import open_reconstruction
+from resdepth_colmap.io.colmap.reconstruction import open_reconstruction
 from resdepth_colmap.scene import Matrix
 
 

@@ -4,7 +4,7 @@ import dataclasses
 import shutil
 from pathlib import Path
 
-from resdepth_colmap.io.depth_map import read_depth_map, write_depth_map
+from resdepth_colmap.io.colmap.depth_map import read_depth_map, write_depth_map
 from resdepth_colmap.io.files import safe_name
 from resdepth_colmap.scene import DepthMap
 

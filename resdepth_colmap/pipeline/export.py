@@ -4,16 +4,16 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.io.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.model import read_scene
+from resdepth_colmap.io.colmap.output import OutputWorkspace, write_record
+from resdepth_colmap.io.colmap.workspace import Workspace
 from resdepth_colmap.io.exported_map import (
     MAX_PNG_VALUE,
     write_npy,
     write_pfm,
     write_png16,
 )
-from resdepth_colmap.io.model import read_scene
-from resdepth_colmap.io.output import OutputWorkspace, write_record
-from resdepth_colmap.io.workspace import Workspace
 from resdepth_colmap.pipeline.export_config import REFINED, MapFormat
 from resdepth_colmap.pipeline.initial_map import map_path
 from resdepth_colmap.progress import Progress, SilentProgress

@@ -13,11 +13,11 @@ import numpy as np
 from resdepth_colmap.config import FuseConfig, Fuser
 from resdepth_colmap.errors import ConfigError, FusionError
 from resdepth_colmap.geometry.view_selection import choose_sources
-from resdepth_colmap.io.depth_map import read_map_size
+from resdepth_colmap.io.colmap.depth_map import read_map_size
+from resdepth_colmap.io.colmap.output import OutputWorkspace
+from resdepth_colmap.io.colmap.workspace import Workspace
 from resdepth_colmap.io.open3d_library import load_open3d
-from resdepth_colmap.io.output import OutputWorkspace
 from resdepth_colmap.io.point_cloud import PointCloud
-from resdepth_colmap.io.workspace import Workspace
 from resdepth_colmap.pipeline.consistency import (
     Consistent,
     FuseStatistics,

@@ -3,10 +3,10 @@
 from pathlib import Path
 
 from resdepth_colmap.config import FuseConfig
-from resdepth_colmap.io.model import read_scene
-from resdepth_colmap.io.output import OutputWorkspace
+from resdepth_colmap.io.colmap.model import read_scene
+from resdepth_colmap.io.colmap.output import OutputWorkspace
+from resdepth_colmap.io.colmap.workspace import open_workspace
 from resdepth_colmap.io.point_cloud import check_cloud_path, write_cloud
-from resdepth_colmap.io.workspace import open_workspace
 from resdepth_colmap.pipeline.fuse import fuse_workspace
 from resdepth_colmap.progress import Progress
 

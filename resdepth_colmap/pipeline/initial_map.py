@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.io.depth_map import read_depth_map, read_map_size
-from resdepth_colmap.io.workspace import Workspace, original_map_path
+from resdepth_colmap.io.colmap.depth_map import read_depth_map, read_map_size
+from resdepth_colmap.io.colmap.workspace import Workspace, original_map_path
 from resdepth_colmap.scene import Camera, DepthMap, Scene
 
 AUTO = "auto"

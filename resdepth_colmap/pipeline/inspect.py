@@ -9,8 +9,8 @@ import numpy as np
 
 from resdepth_colmap.config import RefineConfig, StereoBackend, StereoConfig
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.io.depth_map import read_depth_map, read_map_size
-from resdepth_colmap.io.workspace import Workspace, missing_images
+from resdepth_colmap.io.colmap.depth_map import read_depth_map, read_map_size
+from resdepth_colmap.io.colmap.workspace import Workspace, missing_images
 from resdepth_colmap.pipeline.initial_map import (
     candidate_kinds,
     check_map_size,

@@ -8,9 +8,9 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from resdepth_colmap.io.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.output import OutputWorkspace
 from resdepth_colmap.io.images import read_rgb, write_png
-from resdepth_colmap.io.output import OutputWorkspace
 from resdepth_colmap.pipeline.canvas import (
     BAR_HEIGHT_PX,
     BAR_LABEL_HEIGHT_PX,

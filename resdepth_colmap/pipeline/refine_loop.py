@@ -8,8 +8,8 @@ import numpy as np
 
 from resdepth_colmap.config import RefineConfig
 from resdepth_colmap.geometry.view_selection import SourceChoice
-from resdepth_colmap.io.output import OutputWorkspace, read_record, write_record
-from resdepth_colmap.io.workspace import Workspace
+from resdepth_colmap.io.colmap.output import OutputWorkspace, read_record, write_record
+from resdepth_colmap.io.colmap.workspace import Workspace
 from resdepth_colmap.network.unet import ResDepthNet
 from resdepth_colmap.pipeline.earlier_maps import EarlierMaps
 from resdepth_colmap.pipeline.initial_map import (

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from resdepth_colmap.geometry.view_selection import SourceChoice, choose_sources
-from resdepth_colmap.io.patch_match_cfg import SourceKind, read_sources
-from resdepth_colmap.io.workspace import Workspace
+from resdepth_colmap.io.colmap.cfg import SourceKind, read_sources
+from resdepth_colmap.io.colmap.workspace import Workspace
 from resdepth_colmap.pipeline.initial_map import candidate_kinds, map_path
 from resdepth_colmap.scene import Scene, View
 

@@ -7,9 +7,9 @@ from typing import Any
 
 from resdepth_colmap.config import RefineConfig
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.io.model import read_scene
-from resdepth_colmap.io.output import OutputWorkspace
-from resdepth_colmap.io.workspace import Workspace
+from resdepth_colmap.io.colmap.model import read_scene
+from resdepth_colmap.io.colmap.output import OutputWorkspace
+from resdepth_colmap.io.colmap.workspace import Workspace
 from resdepth_colmap.network.device import resolve_device
 from resdepth_colmap.network.inference import for_inference
 from resdepth_colmap.network.network_config import NetworkConfig

@@ -11,10 +11,10 @@ from typing import Any
 
 from resdepth_colmap.config import Fuser
 from resdepth_colmap.errors import FusionError
-from resdepth_colmap.io.model import read_scene
-from resdepth_colmap.io.output import OutputWorkspace, read_record, write_record
+from resdepth_colmap.io.colmap.model import read_scene
+from resdepth_colmap.io.colmap.output import OutputWorkspace, read_record, write_record
+from resdepth_colmap.io.colmap.workspace import Workspace, check_images, open_workspace
 from resdepth_colmap.io.point_cloud import write_cloud
-from resdepth_colmap.io.workspace import Workspace, check_images, open_workspace
 from resdepth_colmap.network.device import resolve_device
 from resdepth_colmap.network.weights import load_weights
 from resdepth_colmap.pipeline.fuse import fuse_initial, fuse_workspace

@@ -5,8 +5,8 @@ import logging
 
 from resdepth_colmap.config import StereoBackend, StereoConfig
 from resdepth_colmap.errors import BackendUnavailableError, WorkspaceError
-from resdepth_colmap.io.masks import check_masks
-from resdepth_colmap.io.workspace import Workspace
+from resdepth_colmap.io.colmap.masks import check_masks
+from resdepth_colmap.io.colmap.workspace import Workspace
 from resdepth_colmap.pipeline.stereo_colmap import run_colmap
 from resdepth_colmap.pipeline.stereo_ledger import Fingerprints, StereoLedger
 from resdepth_colmap.pipeline.stereo_passes import (

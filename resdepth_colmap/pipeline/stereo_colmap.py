@@ -9,15 +9,15 @@ import numpy as np
 
 from resdepth_colmap.config import StereoConfig
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.io.depth_map import read_depth_map, write_depth_map
-from resdepth_colmap.io.masks import mask_file, read_mask
-from resdepth_colmap.io.normal_map import read_normal_map, write_normal_map
-from resdepth_colmap.io.patch_match_cfg import (
+from resdepth_colmap.io.colmap.cfg import (
     SourceKind,
     SourceSpec,
     write_patch_match_cfg,
 )
-from resdepth_colmap.io.workspace import Workspace
+from resdepth_colmap.io.colmap.depth_map import read_depth_map, write_depth_map
+from resdepth_colmap.io.colmap.masks import mask_file, read_mask
+from resdepth_colmap.io.colmap.normal_map import read_normal_map, write_normal_map
+from resdepth_colmap.io.colmap.workspace import Workspace
 from resdepth_colmap.pipeline.stereo_ledger import GEOMETRIC, PHOTOMETRIC
 from resdepth_colmap.pipeline.stereo_plan import plan_stereo
 from resdepth_colmap.scene import Scene

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from resdepth_colmap.config import StereoConfig
-from resdepth_colmap.io.masks import mask_file
-from resdepth_colmap.io.output import read_record, write_record
-from resdepth_colmap.io.workspace import Workspace
+from resdepth_colmap.io.colmap.masks import mask_file
+from resdepth_colmap.io.colmap.output import read_record, write_record
+from resdepth_colmap.io.colmap.workspace import Workspace
 from resdepth_colmap.matching.patch_match import METHOD
 from resdepth_colmap.pipeline.stereo_plan import StereoPlan
 from resdepth_colmap.scene import Scene

@@ -15,12 +15,12 @@ from resdepth_colmap.config import StereoConfig
 from resdepth_colmap.geometry.holes import fill_holes
 from resdepth_colmap.geometry.normals import normals_from_depth
 from resdepth_colmap.geometry.pixels import index_K
-from resdepth_colmap.io.consistency_graph import write_consistency_graph
-from resdepth_colmap.io.depth_map import write_depth_map
-from resdepth_colmap.io.masks import Wanted, mask_file, read_mask
-from resdepth_colmap.io.model import read_image_indices
-from resdepth_colmap.io.normal_map import read_normal_map, write_normal_map
-from resdepth_colmap.io.workspace import Workspace
+from resdepth_colmap.io.colmap.consistency_graph import write_consistency_graph
+from resdepth_colmap.io.colmap.depth_map import write_depth_map
+from resdepth_colmap.io.colmap.masks import Wanted, mask_file, read_mask
+from resdepth_colmap.io.colmap.model import read_image_indices
+from resdepth_colmap.io.colmap.normal_map import read_normal_map, write_normal_map
+from resdepth_colmap.io.colmap.workspace import Workspace
 from resdepth_colmap.matching.filtering import filter_result
 from resdepth_colmap.matching.patch_match import MatchView, Surface, match_view
 from resdepth_colmap.pipeline.depth_sketch import SIDE_PX, WIDE, sketched_range

@@ -10,8 +10,8 @@ from resdepth_colmap.geometry.view_selection import (
     choose_sources,
     spread_choices,
 )
-from resdepth_colmap.io.patch_match_cfg import SourceKind, SourceSpec, read_sources
-from resdepth_colmap.io.workspace import Workspace
+from resdepth_colmap.io.colmap.cfg import SourceKind, SourceSpec, read_sources
+from resdepth_colmap.io.colmap.workspace import Workspace
 from resdepth_colmap.scene import Scene
 
 logger = logging.getLogger(__name__)

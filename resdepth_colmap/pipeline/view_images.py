@@ -6,9 +6,9 @@ from collections.abc import Callable, Hashable
 import cv2
 import numpy as np
 
-from resdepth_colmap.io.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.workspace import Workspace
 from resdepth_colmap.io.images import read_gray, read_unit_colors
-from resdepth_colmap.io.workspace import Workspace
 from resdepth_colmap.scene import (
     Camera,
     DepthMap,

@@ -7,9 +7,9 @@ import numpy as np
 import numpy.typing as npt
 
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.io.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.output import OutputWorkspace
 from resdepth_colmap.io.images import read_rgb
-from resdepth_colmap.io.output import OutputWorkspace
 from resdepth_colmap.pipeline.initial_map import map_path
 from resdepth_colmap.scene import ColorImage, DepthMap, FloatMap
 

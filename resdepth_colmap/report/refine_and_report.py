@@ -5,8 +5,8 @@ import time
 from pathlib import Path
 
 from resdepth_colmap.errors import FusionError
-from resdepth_colmap.io.output import OutputWorkspace, read_record, write_record
-from resdepth_colmap.io.workspace import open_workspace
+from resdepth_colmap.io.colmap.output import OutputWorkspace, read_record, write_record
+from resdepth_colmap.io.colmap.workspace import open_workspace
 from resdepth_colmap.pipeline.run import RunResult, run_refine
 from resdepth_colmap.pipeline.run_config import RunConfig
 from resdepth_colmap.progress import Progress

@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Any
 
 from resdepth_colmap.errors import WorkspaceError
+from resdepth_colmap.io.colmap.model import read_scene
+from resdepth_colmap.io.colmap.output import OutputWorkspace, read_record
+from resdepth_colmap.io.colmap.workspace import open_workspace
 from resdepth_colmap.io.files import write_whole
-from resdepth_colmap.io.model import read_scene
-from resdepth_colmap.io.output import OutputWorkspace, read_record
 from resdepth_colmap.io.point_cloud import read_cloud
-from resdepth_colmap.io.workspace import open_workspace
 from resdepth_colmap.pipeline.fuse_to_file import cloud_before_path, cloud_path
 from resdepth_colmap.pipeline.pictures import evenly_chosen
 from resdepth_colmap.progress import Progress, SilentProgress

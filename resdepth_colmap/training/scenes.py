@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from resdepth_colmap.errors import TrainingError, WorkspaceError
-from resdepth_colmap.io.workspace import open_workspace
+from resdepth_colmap.io.colmap.workspace import open_workspace
 
 TRUTH_FOLDER = "ground_truth"
 _NO_NAMES = ("dense", "undistorted")  # folders that are called the same everywhere

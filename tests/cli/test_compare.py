@@ -12,8 +12,8 @@ from laser_scans import room_scan, write_scene
 from planes import plane_views
 
 from resdepth_colmap.cli.main import main
-from resdepth_colmap.io.output import OutputWorkspace
-from resdepth_colmap.io.workspace import open_workspace
+from resdepth_colmap.io.colmap.output import OutputWorkspace
+from resdepth_colmap.io.colmap.workspace import open_workspace
 
 ALL_VIEWS = ("--min-num-views", "1")
 

@@ -18,11 +18,11 @@ from resdepth_colmap.evaluation.case_matching import (
 from resdepth_colmap.evaluation.colmap_pair import match_by_colmap
 from resdepth_colmap.evaluation.depth_case import DepthCase, InitialDepth
 from resdepth_colmap.geometry.pixels import index_K
-from resdepth_colmap.io.depth_map import write_depth_map
+from resdepth_colmap.io.colmap.cfg import SourceKind, read_sources
+from resdepth_colmap.io.colmap.depth_map import write_depth_map
+from resdepth_colmap.io.colmap.model import read_scene
+from resdepth_colmap.io.colmap.workspace import check_images, open_workspace
 from resdepth_colmap.io.images import read_gray
-from resdepth_colmap.io.model import read_scene
-from resdepth_colmap.io.patch_match_cfg import SourceKind, read_sources
-from resdepth_colmap.io.workspace import check_images, open_workspace
 from resdepth_colmap.matching.patch_match import MatchView
 from resdepth_colmap.scene import baseline
 

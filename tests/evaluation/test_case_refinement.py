@@ -13,8 +13,8 @@ from resdepth_colmap.config import RefineConfig
 from resdepth_colmap.evaluation.case_refinement import refine_case
 from resdepth_colmap.evaluation.depth_case import DepthCase, InitialDepth
 from resdepth_colmap.geometry.pixels import index_K
-from resdepth_colmap.io.depth_map import read_depth_map, write_depth_map
-from resdepth_colmap.io.workspace import open_workspace
+from resdepth_colmap.io.colmap.depth_map import read_depth_map, write_depth_map
+from resdepth_colmap.io.colmap.workspace import open_workspace
 from resdepth_colmap.matching.patch_match import MatchView
 from resdepth_colmap.network.unet import ResDepthNet
 from resdepth_colmap.network.weights import save_weights

@@ -27,7 +27,7 @@ from resdepth_colmap.evaluation.depth_evaluation import (
 from resdepth_colmap.evaluation.depth_report import DepthReport, SceneResult
 from resdepth_colmap.evaluation.depth_scenes import scene_sources
 from resdepth_colmap.evaluation.match_cache import MatchCache
-from resdepth_colmap.io.depth_map import write_depth_map
+from resdepth_colmap.io.colmap.depth_map import write_depth_map
 from resdepth_colmap.network.weights import weights_hash
 from resdepth_colmap.scene import DepthMap
 

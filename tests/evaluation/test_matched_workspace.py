@@ -16,7 +16,7 @@ from resdepth_colmap.evaluation.matched_workspace import (
     matched_workspace,
 )
 from resdepth_colmap.evaluation.matching_parts import stretched_range
-from resdepth_colmap.io.patch_match_cfg import SourceKind, SourceSpec
+from resdepth_colmap.io.colmap.cfg import SourceKind, SourceSpec
 
 ALL = SourceSpec(kind=SourceKind.ALL)
 FIRST = StereoConfig(geom_consistency=False, filter=False)

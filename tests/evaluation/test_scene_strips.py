@@ -14,7 +14,7 @@ from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.evaluation import case_matching
 from resdepth_colmap.evaluation.match_cache import MatchCache
 from resdepth_colmap.evaluation.scene_strips import scene_strips, scenes_at
-from resdepth_colmap.io.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.depth_map import read_depth_map
 from resdepth_colmap.io.images import read_rgb
 
 

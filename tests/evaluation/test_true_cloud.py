@@ -9,9 +9,9 @@ from scipy.spatial import cKDTree
 
 from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.evaluation.true_cloud import DepthTruth, read_depth_truth
-from resdepth_colmap.io.depth_map import write_depth_map
-from resdepth_colmap.io.model import read_scene
-from resdepth_colmap.io.workspace import open_workspace
+from resdepth_colmap.io.colmap.depth_map import write_depth_map
+from resdepth_colmap.io.colmap.model import read_scene
+from resdepth_colmap.io.colmap.workspace import open_workspace
 from resdepth_colmap.progress import SilentProgress
 from resdepth_colmap.scene import DepthMap
 

@@ -8,8 +8,8 @@ from analytic_scene import CAMERA, turned, view_at
 from looking_views import lookers
 
 from resdepth_colmap.geometry.view_selection import choose_sources, spread_choices
-from resdepth_colmap.io.model import read_scene
-from resdepth_colmap.io.workspace import Workspace, open_workspace
+from resdepth_colmap.io.colmap.model import read_scene
+from resdepth_colmap.io.colmap.workspace import Workspace, open_workspace
 from resdepth_colmap.scene import Scene
 
 ROW = Scene(views=tuple(view_at((0.4 * i, 0.0, 0.0), CAMERA) for i in range(5)))

@@ -10,8 +10,8 @@ from workspaces import plane_folder
 
 from resdepth_colmap.config import StereoConfig
 from resdepth_colmap.geometry.pixels import index_K
-from resdepth_colmap.io.model import read_scene
-from resdepth_colmap.io.workspace import open_workspace
+from resdepth_colmap.io.colmap.model import read_scene
+from resdepth_colmap.io.colmap.workspace import open_workspace
 from resdepth_colmap.matching.patch_match import MatchView
 from resdepth_colmap.pipeline import stereo_passes
 from resdepth_colmap.pipeline.depth_sketch import sketched_range

@@ -16,10 +16,10 @@ from fusion_scene import (
 
 from resdepth_colmap.config import FuseConfig, Fuser
 from resdepth_colmap.errors import ConfigError, FusionError, WorkspaceError
-from resdepth_colmap.io.depth_map import write_depth_map
+from resdepth_colmap.io.colmap.depth_map import write_depth_map
+from resdepth_colmap.io.colmap.output import OutputWorkspace
+from resdepth_colmap.io.colmap.workspace import Workspace
 from resdepth_colmap.io.images import write_png
-from resdepth_colmap.io.output import OutputWorkspace
-from resdepth_colmap.io.workspace import Workspace
 from resdepth_colmap.pipeline import fuse
 from resdepth_colmap.pipeline.fuse import fuse_initial, fuse_workspace
 from resdepth_colmap.pipeline.fuse_view import LazyViews, MapFiles

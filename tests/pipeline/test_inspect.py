@@ -9,9 +9,9 @@ from planes import NAMES
 from workspaces import plane_folder
 
 from resdepth_colmap.config import RefineConfig, StereoBackend
-from resdepth_colmap.io.depth_map import read_depth_map, write_depth_map
-from resdepth_colmap.io.model import read_scene
-from resdepth_colmap.io.workspace import open_workspace
+from resdepth_colmap.io.colmap.depth_map import read_depth_map, write_depth_map
+from resdepth_colmap.io.colmap.model import read_scene
+from resdepth_colmap.io.colmap.workspace import open_workspace
 from resdepth_colmap.pipeline.inspect import Inspection, inspect_workspace
 
 

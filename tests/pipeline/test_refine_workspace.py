@@ -13,10 +13,10 @@ from workspaces import identity_weights, plane_folder
 
 from resdepth_colmap.config import RefineConfig
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.io.depth_map import read_depth_map, write_depth_map
-from resdepth_colmap.io.output import read_record
+from resdepth_colmap.io.colmap.depth_map import read_depth_map, write_depth_map
+from resdepth_colmap.io.colmap.output import read_record
+from resdepth_colmap.io.colmap.workspace import open_workspace
 from resdepth_colmap.io.point_cloud import read_cloud
-from resdepth_colmap.io.workspace import open_workspace
 from resdepth_colmap.pipeline.refine_workspace import RefineReport, refine_workspace
 from resdepth_colmap.progress import Advance
 

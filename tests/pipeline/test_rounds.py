@@ -12,9 +12,9 @@ from refined_plane import network
 from workspaces import plane_folder
 
 from resdepth_colmap.config import RefineConfig
-from resdepth_colmap.io.depth_map import read_depth_map, write_depth_map
-from resdepth_colmap.io.model import read_scene
-from resdepth_colmap.io.workspace import open_workspace
+from resdepth_colmap.io.colmap.depth_map import read_depth_map, write_depth_map
+from resdepth_colmap.io.colmap.model import read_scene
+from resdepth_colmap.io.colmap.workspace import open_workspace
 from resdepth_colmap.network.weights import load_weights, save_weights
 from resdepth_colmap.pipeline.refine import refine_view
 from resdepth_colmap.pipeline.refine_workspace import RefineReport, refine_workspace

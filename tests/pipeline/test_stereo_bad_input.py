@@ -13,9 +13,9 @@ from workspaces import plane_folder
 
 from resdepth_colmap.cli.main import main
 from resdepth_colmap.config import StereoBackend, StereoConfig
-from resdepth_colmap.io.map_file import read_planes
-from resdepth_colmap.io.model import read_scene
-from resdepth_colmap.io.workspace import check_images, open_workspace
+from resdepth_colmap.io.colmap.map_file import read_planes
+from resdepth_colmap.io.colmap.model import read_scene
+from resdepth_colmap.io.colmap.workspace import check_images, open_workspace
 from resdepth_colmap.pipeline.stereo import StereoReport, stereo_workspace
 
 SIZE_PX = (48, 36)

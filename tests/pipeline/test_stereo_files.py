@@ -12,11 +12,11 @@ from workspaces import plane_folder
 
 from resdepth_colmap.config import StereoBackend, StereoConfig
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.io.depth_map import read_depth_map
-from resdepth_colmap.io.model import read_image_indices, read_scene
-from resdepth_colmap.io.normal_map import read_normal_map
-from resdepth_colmap.io.patch_match_cfg import read_sources
-from resdepth_colmap.io.workspace import Workspace, open_workspace
+from resdepth_colmap.io.colmap.cfg import read_sources
+from resdepth_colmap.io.colmap.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.model import read_image_indices, read_scene
+from resdepth_colmap.io.colmap.normal_map import read_normal_map
+from resdepth_colmap.io.colmap.workspace import Workspace, open_workspace
 from resdepth_colmap.pipeline.stereo import StereoReport, stereo_workspace
 from resdepth_colmap.scene import Scene
 

@@ -11,8 +11,8 @@ from planes import NAMES
 from workspaces import plane_folder
 
 from resdepth_colmap.config import StereoConfig
-from resdepth_colmap.io.model import read_scene
-from resdepth_colmap.io.workspace import Workspace, open_workspace
+from resdepth_colmap.io.colmap.model import read_scene
+from resdepth_colmap.io.colmap.workspace import Workspace, open_workspace
 from resdepth_colmap.pipeline.stereo_plan import plan_stereo
 from resdepth_colmap.scene import Scene
 

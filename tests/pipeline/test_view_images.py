@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 from planes import NAMES, write_plane_workspace
 
+from resdepth_colmap.io.colmap.workspace import open_workspace
 from resdepth_colmap.io.images import write_png
-from resdepth_colmap.io.workspace import open_workspace
 from resdepth_colmap.pipeline.view_images import ArrayCache, ViewImages
 from resdepth_colmap.scene import FloatMap
 

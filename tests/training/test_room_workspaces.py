@@ -12,10 +12,10 @@ from rendered_rooms import CONFIG, OTHER_SEED, SEED, rendered
 from resdepth_colmap.config import SynthesisConfig
 from resdepth_colmap.geometry.pixels import index_K
 from resdepth_colmap.geometry.projection import back_project, project, transform
-from resdepth_colmap.io.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.model import read_scene
+from resdepth_colmap.io.colmap.workspace import check_images, open_workspace
 from resdepth_colmap.io.images import read_rgb
-from resdepth_colmap.io.model import read_scene
-from resdepth_colmap.io.workspace import check_images, open_workspace
 from resdepth_colmap.scene import Matrix, cam_from_cam
 from resdepth_colmap.training import synthesize as module
 from resdepth_colmap.training.synthesize import (

@@ -11,7 +11,7 @@ from planes import NAMES
 from resdepth_colmap.config import StereoConfig
 from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.geometry.resize import nearest_depth
-from resdepth_colmap.io.depth_map import read_depth_map, write_depth_map
+from resdepth_colmap.io.colmap.depth_map import read_depth_map, write_depth_map
 from resdepth_colmap.network.network_config import InputVariant, NetworkConfig
 from resdepth_colmap.training import labelled_views as labelled_views_module
 from resdepth_colmap.training.labelled_views import labelled_views

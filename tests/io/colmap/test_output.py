@@ -8,12 +8,12 @@ import pytest
 from planes import NAMES, NORMAL, OFFSET, PlaneView, write_plane_workspace
 
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.io.depth_map import read_depth_map
-from resdepth_colmap.io.normal_map import read_normal_map
-from resdepth_colmap.io.output import OutputWorkspace, read_record, write_record
-from resdepth_colmap.io.patch_match_cfg import read_fusion_cfg, read_sources
+from resdepth_colmap.io.colmap.cfg import read_fusion_cfg, read_sources
+from resdepth_colmap.io.colmap.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.normal_map import read_normal_map
+from resdepth_colmap.io.colmap.output import OutputWorkspace, read_record, write_record
+from resdepth_colmap.io.colmap.workspace import open_workspace, original_map_path
 from resdepth_colmap.io.point_cloud import read_cloud
-from resdepth_colmap.io.workspace import open_workspace, original_map_path
 
 
 def _write_all(output: OutputWorkspace, plane: list[PlaneView]) -> None:

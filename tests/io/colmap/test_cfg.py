@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.io.patch_match_cfg import (
+from resdepth_colmap.io.colmap.cfg import (
     SourceKind,
     SourceSpec,
     read_fusion_cfg,

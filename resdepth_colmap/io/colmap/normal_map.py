@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.io import map_file
+from resdepth_colmap.io.colmap import map_file
 from resdepth_colmap.scene import NormalMap
 
 

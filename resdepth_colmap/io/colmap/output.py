@@ -10,17 +10,21 @@ from pathlib import Path
 from typing import Any
 
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.io.depth_map import write_depth_map
-from resdepth_colmap.io.files import link_or_copy, safe_name, whole_file, write_whole
-from resdepth_colmap.io.model_file import MODEL_PARTS
-from resdepth_colmap.io.normal_map import write_normal_map
-from resdepth_colmap.io.patch_match_cfg import (
+from resdepth_colmap.io.colmap.cfg import (
     SourceKind,
     SourceSpec,
     write_fusion_cfg,
     write_patch_match_cfg,
 )
-from resdepth_colmap.io.workspace import ORIGINAL_SUFFIX, OUTPUT_FOLDER, Workspace
+from resdepth_colmap.io.colmap.depth_map import write_depth_map
+from resdepth_colmap.io.colmap.model_file import MODEL_PARTS
+from resdepth_colmap.io.colmap.normal_map import write_normal_map
+from resdepth_colmap.io.colmap.workspace import (
+    ORIGINAL_SUFFIX,
+    OUTPUT_FOLDER,
+    Workspace,
+)
+from resdepth_colmap.io.files import link_or_copy, safe_name, whole_file, write_whole
 from resdepth_colmap.scene import DepthMap, FloatMap, NormalMap
 
 KIND = "geometric"

@@ -7,7 +7,7 @@ import pytest
 from planes import NAMES, plane_views, write_model, write_plane_workspace
 
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.io.model import read_scene
+from resdepth_colmap.io.colmap.model import read_scene
 from resdepth_colmap.scene import Scene
 
 

@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.io.masks import check_masks, mask_file, read_mask
+from resdepth_colmap.io.colmap.masks import check_masks, mask_file, read_mask
 from resdepth_colmap.scene import Camera
 
 CAMERA = Camera(width_px=8, height_px=6, fx=9.0, fy=9.0, cx=4.0, cy=3.0)

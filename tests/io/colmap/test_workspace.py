@@ -7,15 +7,15 @@ import pytest
 from planes import NAMES, write_plane_workspace
 
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.io.images import write_png
-from resdepth_colmap.io.model import read_scene
-from resdepth_colmap.io.workspace import (
+from resdepth_colmap.io.colmap.model import read_scene
+from resdepth_colmap.io.colmap.workspace import (
     Workspace,
     check_images,
     missing_images,
     open_workspace,
     original_map_path,
 )
+from resdepth_colmap.io.images import write_png
 from resdepth_colmap.scene import Scene
 
 

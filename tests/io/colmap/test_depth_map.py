@@ -8,7 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.io.depth_map import read_depth_map, read_map_size, write_depth_map
+from resdepth_colmap.io.colmap.depth_map import (
+    read_depth_map,
+    read_map_size,
+    write_depth_map,
+)
 
 
 def _f32(values: object) -> npt.NDArray[np.float32]:

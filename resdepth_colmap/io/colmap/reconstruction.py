@@ -8,7 +8,7 @@ from typing import Any
 import pycolmap
 
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.io.model_file import check_model_files
+from resdepth_colmap.io.colmap.model_file import check_model_files
 
 PYCOLMAP_ERRORS = (ValueError, IndexError, KeyError, RuntimeError, OSError)
 """What pycolmap raises for a broken model (UnicodeDecodeError is a ValueError)."""

@@ -10,14 +10,14 @@ import numpy.typing as npt
 import pycolmap
 
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.io.files import safe_name
-from resdepth_colmap.io.model_file import find_model, names_in_text
-from resdepth_colmap.io.reconstruction import (
+from resdepth_colmap.io.colmap.model_file import find_model, names_in_text
+from resdepth_colmap.io.colmap.reconstruction import (
     PYCOLMAP_ERRORS,
     broken_model,
     open_reconstruction,
     quiet_pycolmap,
 )
+from resdepth_colmap.io.files import safe_name
 from resdepth_colmap.scene import Camera, Matrix, Scene, View
 
 _PINHOLES = ("PINHOLE", "SIMPLE_PINHOLE")

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from resdepth_colmap.io.reconstruction import open_reconstruction
+from resdepth_colmap.io.colmap.reconstruction import open_reconstruction
 from resdepth_colmap.scene import Matrix
 
 

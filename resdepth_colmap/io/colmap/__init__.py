@@ -1,0 +1,1 @@
+"""COLMAP's formats: workspaces, models, maps, cfg files, masks."""
