@@ -13,12 +13,12 @@ if TYPE_CHECKING:
     from resdepth_colmap.errors import ResDepthError
     from resdepth_colmap.io.colmap.workspace import Workspace, open_workspace
     from resdepth_colmap.network.weights import load_weights
-    from resdepth_colmap.pipeline.fuse import fuse_workspace
-    from resdepth_colmap.pipeline.refine import SourceView, ViewInputs, refine_view
-    from resdepth_colmap.pipeline.refine_workspace import refine_workspace
+    from resdepth_colmap.pipeline.fuse.stage import fuse_workspace
+    from resdepth_colmap.pipeline.refine.cross_view import SourceMap
+    from resdepth_colmap.pipeline.refine.stage import refine_workspace
+    from resdepth_colmap.pipeline.refine.view import SourceView, ViewInputs, refine_view
     from resdepth_colmap.pipeline.run import run_refine
     from resdepth_colmap.pipeline.run_config import RunConfig
-    from resdepth_colmap.pipeline.source_maps import SourceMap
     from resdepth_colmap.report.refine_and_report import refine_and_report
     from resdepth_colmap.scene import Camera, Scene, View
 
@@ -53,18 +53,18 @@ _MODULE_OF = {
     "ResDepthError": "errors",
     "RunConfig": "pipeline.run_config",
     "Scene": "scene",
-    "SourceMap": "pipeline.source_maps",
-    "SourceView": "pipeline.refine",
+    "SourceMap": "pipeline.refine.cross_view",
+    "SourceView": "pipeline.refine.view",
     "StereoConfig": "config",
     "View": "scene",
-    "ViewInputs": "pipeline.refine",
-    "Workspace": "io.workspace",
-    "fuse_workspace": "pipeline.fuse",
+    "ViewInputs": "pipeline.refine.view",
+    "Workspace": "io.colmap.workspace",
+    "fuse_workspace": "pipeline.fuse.stage",
     "load_weights": "network.weights",
-    "open_workspace": "io.workspace",
+    "open_workspace": "io.colmap.workspace",
     "refine_and_report": "report.refine_and_report",
-    "refine_view": "pipeline.refine",
-    "refine_workspace": "pipeline.refine_workspace",
+    "refine_view": "pipeline.refine.view",
+    "refine_workspace": "pipeline.refine.stage",
     "run_refine": "pipeline.run",
 }
 

@@ -23,7 +23,7 @@ from resdepth_colmap.config import RefineConfig
 from resdepth_colmap.io.colmap.depth_map import read_depth_map
 from resdepth_colmap.io.colmap.workspace import open_workspace
 from resdepth_colmap.network.weights import weights_hash
-from resdepth_colmap.pipeline.refine_workspace import refine_workspace
+from resdepth_colmap.pipeline.refine.stage import refine_workspace
 from resdepth_colmap.scene import DepthMap
 
 REPOSITORY = Path(__file__).resolve().parents[1]

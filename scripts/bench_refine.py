@@ -23,7 +23,7 @@ from resdepth_colmap.evaluation.tables import refine_table
 from resdepth_colmap.network.inference import for_inference
 from resdepth_colmap.network.unet import ResDepthNet
 from resdepth_colmap.network.weights import load_weights, weights_hash
-from resdepth_colmap.pipeline.refine import SourceView, ViewInputs, refine_view
+from resdepth_colmap.pipeline.refine.view import SourceView, ViewInputs, refine_view
 from resdepth_colmap.versions import versions
 
 REPOSITORY = Path(__file__).resolve().parents[1]

@@ -126,7 +126,7 @@ def run_child(workspace: Path, options: dict[str, Any], ends_at_once: bool) -> N
     from resdepth_colmap.config import StereoBackend, StereoConfig
     from resdepth_colmap.io.colmap.model import read_scene
     from resdepth_colmap.io.colmap.workspace import open_workspace
-    from resdepth_colmap.pipeline.stereo import stereo_workspace
+    from resdepth_colmap.pipeline.stereo.stage import stereo_workspace
 
     peaks = MemoryPeaks(ends_at_once)
     opened = open_workspace(workspace)

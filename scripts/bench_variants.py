@@ -41,7 +41,7 @@ from resdepth_colmap.network.network_config import (
 from resdepth_colmap.network.unet import ResDepthNet
 from resdepth_colmap.network.weights import load_weights
 from resdepth_colmap.pipeline.initial_map import choose_initial_map
-from resdepth_colmap.pipeline.refine import ViewInputs, refine_view
+from resdepth_colmap.pipeline.refine.view import ViewInputs, refine_view
 from resdepth_colmap.scene import DepthMap
 from resdepth_colmap.training.labelled_views import labelled_views
 from resdepth_colmap.training.loop import train

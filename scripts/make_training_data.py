@@ -22,7 +22,7 @@ def make_room(output: Path, seed: int) -> str:
     from resdepth_colmap.errors import WorkspaceError
     from resdepth_colmap.io.colmap.model import read_scene
     from resdepth_colmap.io.colmap.workspace import open_workspace
-    from resdepth_colmap.pipeline.stereo import stereo_workspace
+    from resdepth_colmap.pipeline.stereo.stage import stereo_workspace
     from resdepth_colmap.training.synthesize import synthesize
 
     config = SynthesisConfig(

@@ -8,7 +8,8 @@ import pytest
 
 from resdepth_colmap.config import StereoConfig
 from resdepth_colmap.matching.patch_match import MatchResult, MatchView, Surface
-from resdepth_colmap.pipeline import stereo, stereo_passes
+from resdepth_colmap.pipeline.stereo import passes as stereo_passes
+from resdepth_colmap.pipeline.stereo import stage as stereo
 from resdepth_colmap.scene import DepthMap
 
 DEPTH = 4.0

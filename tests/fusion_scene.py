@@ -15,7 +15,7 @@ from analytic_scene import (
 )
 
 from resdepth_colmap.geometry.pixels import index_K
-from resdepth_colmap.pipeline.fuse_view import FuseView
+from resdepth_colmap.pipeline.fuse.views import FuseView
 from resdepth_colmap.scene import ColorImage, DepthMap, FloatMap, Matrix, View
 
 Points = Matrix | FloatMap

@@ -14,7 +14,7 @@ from resdepth_colmap.config import RefineConfig
 from resdepth_colmap.geometry.pixels import index_K
 from resdepth_colmap.network.network_config import NetworkConfig
 from resdepth_colmap.network.unet import ResDepthNet
-from resdepth_colmap.pipeline.refine import SourceView, ViewInputs
+from resdepth_colmap.pipeline.refine.view import SourceView, ViewInputs
 from resdepth_colmap.scene import cam_from_cam
 
 SMALL: dict[str, object] = {

@@ -52,7 +52,7 @@ def fuse(
     config = build_config(FuseConfig, values)
     from resdepth_colmap.cli.log import BarProgress
     from resdepth_colmap.cli.printed import show_line
-    from resdepth_colmap.pipeline.fuse_to_file import fuse_to_file
+    from resdepth_colmap.pipeline.fuse.to_file import fuse_to_file
 
     path, num_points = fuse_to_file(
         workspace,

@@ -47,7 +47,7 @@ def stereo(
     from resdepth_colmap.cli.log import BarProgress
     from resdepth_colmap.io.colmap.model import read_scene
     from resdepth_colmap.io.colmap.workspace import check_images, open_workspace
-    from resdepth_colmap.pipeline.stereo import stereo_workspace
+    from resdepth_colmap.pipeline.stereo.stage import stereo_workspace
 
     opened = open_workspace(workspace)
     scene = read_scene(opened.sparse_path, opened.images_path, opened.path)

@@ -21,10 +21,10 @@ from resdepth_colmap.io.colmap.output import OutputWorkspace
 from resdepth_colmap.io.colmap.workspace import Workspace
 from resdepth_colmap.io.files import link_or_copy
 from resdepth_colmap.io.point_cloud import PointCloud
-from resdepth_colmap.pipeline.consistency import FuseStatistics
-from resdepth_colmap.pipeline.fuse import fuse_maps
-from resdepth_colmap.pipeline.fuse_colmap import fuse_with_colmap
-from resdepth_colmap.pipeline.fuse_view import MapFiles
+from resdepth_colmap.pipeline.fuse.colmap import fuse_with_colmap
+from resdepth_colmap.pipeline.fuse.geometric_consistency import FuseStatistics
+from resdepth_colmap.pipeline.fuse.stage import fuse_maps
+from resdepth_colmap.pipeline.fuse.views import MapFiles
 from resdepth_colmap.progress import Progress
 from resdepth_colmap.scene import Scene
 

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from resdepth_colmap.evaluation.arms import Arm
 from resdepth_colmap.geometry.pixels import index_K
 from resdepth_colmap.io.colmap.depth_map import read_depth_map
-from resdepth_colmap.pipeline.fuse_view import MapFiles
+from resdepth_colmap.pipeline.fuse.views import MapFiles
 from resdepth_colmap.pipeline.view_images import ArrayCache, nearest_resized
 from resdepth_colmap.scene import DepthMap, Matrix, View
 

@@ -11,9 +11,9 @@ from resdepth_colmap.evaluation.compare_config import CompareConfig
 from resdepth_colmap.io.colmap.depth_map import read_depth_map
 from resdepth_colmap.io.colmap.output import OutputWorkspace
 from resdepth_colmap.io.colmap.workspace import Workspace, original_map_path
-from resdepth_colmap.pipeline.fuse_view import MapFiles
+from resdepth_colmap.pipeline.fuse.views import MapFiles
 from resdepth_colmap.pipeline.initial_map import check_map_size, map_path
-from resdepth_colmap.pipeline.source_maps import FILTERED_SHARE
+from resdepth_colmap.pipeline.refine.cross_view import FILTERED_SHARE
 from resdepth_colmap.scene import Scene, View
 
 ARMS = ("filtered", "unfiltered", "refined")

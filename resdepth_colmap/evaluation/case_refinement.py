@@ -12,8 +12,8 @@ from resdepth_colmap.evaluation.depth_case import (
 )
 from resdepth_colmap.matching.patch_match import MatchView
 from resdepth_colmap.network.unet import ResDepthNet
-from resdepth_colmap.pipeline.refine import SourceView, ViewInputs, refine_view
-from resdepth_colmap.pipeline.source_maps import NUM_SOURCE_MAPS, SourceMap
+from resdepth_colmap.pipeline.refine.cross_view import NUM_SOURCE_MAPS, SourceMap
+from resdepth_colmap.pipeline.refine.view import SourceView, ViewInputs, refine_view
 from resdepth_colmap.scene import DepthMap, UnitColors
 
 

@@ -19,7 +19,7 @@ from resdepth_colmap.network.device import resolve_device
 from resdepth_colmap.network.inference import for_inference
 from resdepth_colmap.network.unet import ResDepthNet
 from resdepth_colmap.network.weights import load_weights, weights_hash
-from resdepth_colmap.pipeline.refine import SourceView, ViewInputs, refine_view
+from resdepth_colmap.pipeline.refine.view import SourceView, ViewInputs, refine_view
 from resdepth_colmap.progress import Progress, SilentProgress
 from resdepth_colmap.versions import versions
 

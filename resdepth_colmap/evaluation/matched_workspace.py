@@ -20,8 +20,8 @@ from resdepth_colmap.io.colmap.cfg import (
 from resdepth_colmap.io.colmap.model import read_scene
 from resdepth_colmap.io.colmap.workspace import Workspace, open_workspace
 from resdepth_colmap.io.files import write_whole
-from resdepth_colmap.pipeline.stereo import stereo_workspace
-from resdepth_colmap.pipeline.stereo_warm_up import warm_up
+from resdepth_colmap.pipeline.stereo.stage import stereo_workspace
+from resdepth_colmap.pipeline.stereo.warm_up import warm_up
 from resdepth_colmap.progress import Progress, SilentProgress
 from resdepth_colmap.scene import Scene
 

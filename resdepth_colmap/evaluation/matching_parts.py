@@ -34,8 +34,8 @@ from resdepth_colmap.io.colmap.cfg import SourceKind, SourceSpec
 from resdepth_colmap.io.colmap.depth_map import read_depth_map
 from resdepth_colmap.io.colmap.workspace import open_workspace
 from resdepth_colmap.io.images import read_gray
-from resdepth_colmap.pipeline.fuse_colmap import fuse_with_colmap
-from resdepth_colmap.pipeline.fuse_view import MapFiles
+from resdepth_colmap.pipeline.fuse.colmap import fuse_with_colmap
+from resdepth_colmap.pipeline.fuse.views import MapFiles
 from resdepth_colmap.progress import SilentProgress
 from resdepth_colmap.scene import DepthMap
 

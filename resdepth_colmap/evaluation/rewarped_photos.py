@@ -8,8 +8,8 @@ from resdepth_colmap.evaluation.tile_sums import TileSums
 from resdepth_colmap.evaluation.witnesses import Sums
 from resdepth_colmap.geometry.inverse_depth import invert_map
 from resdepth_colmap.geometry.warp import warp_to_reference
-from resdepth_colmap.pipeline.photo_consistency import photo_consistency
-from resdepth_colmap.pipeline.refine import SourceView, ViewInputs
+from resdepth_colmap.pipeline.refine.photometric_error import photo_consistency
+from resdepth_colmap.pipeline.refine.view import SourceView, ViewInputs
 
 Sampled = tuple[Tensor, Tensor]
 """A warped photo and where it is inside, shapes (1, 1, H, W)."""

@@ -26,7 +26,7 @@ from resdepth_colmap.io.colmap.depth_map import write_depth_map
 from resdepth_colmap.io.colmap.workspace import open_workspace
 from resdepth_colmap.matching.patch_match import MatchView
 from resdepth_colmap.pipeline.pictures import FOLDER, draw_workspace
-from resdepth_colmap.pipeline.refine_workspace import refine_workspace
+from resdepth_colmap.pipeline.refine.stage import refine_workspace
 from resdepth_colmap.progress import Progress, SilentProgress
 from resdepth_colmap.scene import DepthMap, Scene
 

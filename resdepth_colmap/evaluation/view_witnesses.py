@@ -19,8 +19,8 @@ from resdepth_colmap.evaluation.witnesses import (
 )
 from resdepth_colmap.geometry.view_selection import choose_sources
 from resdepth_colmap.io.colmap.sparse_points import SparsePoints
+from resdepth_colmap.pipeline.refine.load_view import view_inputs
 from resdepth_colmap.pipeline.view_images import ViewImages, nearest_resized
-from resdepth_colmap.pipeline.view_inputs import view_inputs
 from resdepth_colmap.progress import Progress
 from resdepth_colmap.scene import DepthMap, Scene
 

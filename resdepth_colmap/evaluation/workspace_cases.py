@@ -25,7 +25,7 @@ from resdepth_colmap.io.colmap.workspace import Workspace, check_images, open_wo
 from resdepth_colmap.io.images import read_gray
 from resdepth_colmap.matching.patch_match import MatchView
 from resdepth_colmap.pipeline.initial_map import candidate_kinds, choose_initial_map
-from resdepth_colmap.pipeline.source_maps import NUM_SOURCE_MAPS
+from resdepth_colmap.pipeline.refine.cross_view import NUM_SOURCE_MAPS
 from resdepth_colmap.pipeline.view_images import ViewImages
 from resdepth_colmap.scene import DepthMap, Scene, UnitColors, View
 

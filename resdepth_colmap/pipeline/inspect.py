@@ -17,8 +17,8 @@ from resdepth_colmap.pipeline.initial_map import (
     map_path,
 )
 from resdepth_colmap.pipeline.run_config import UNFILTERED
-from resdepth_colmap.pipeline.stereo import choose_backend
-from resdepth_colmap.pipeline.stereo_passes import passes_of
+from resdepth_colmap.pipeline.stereo.passes import passes_of
+from resdepth_colmap.pipeline.stereo.stage import choose_backend
 from resdepth_colmap.scene import Scene, View
 
 MOST_MAPS_READ = 8  # of each kind, spread over the views: info is to be quick

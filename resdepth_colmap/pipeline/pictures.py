@@ -26,7 +26,7 @@ from resdepth_colmap.pipeline.depth_colors import (
 )
 from resdepth_colmap.pipeline.depth_strip import BeforeAfter, depth_strip, filled_share
 from resdepth_colmap.pipeline.initial_map import map_path
-from resdepth_colmap.pipeline.refine_workspace import RefineReport
+from resdepth_colmap.pipeline.refine.stage import RefineReport
 from resdepth_colmap.progress import Progress
 from resdepth_colmap.scene import ColorImage, DepthMap, Scene
 

@@ -17,11 +17,11 @@ from resdepth_colmap.io.colmap.workspace import Workspace, check_images, open_wo
 from resdepth_colmap.io.point_cloud import write_cloud
 from resdepth_colmap.network.device import resolve_device
 from resdepth_colmap.network.weights import load_weights
-from resdepth_colmap.pipeline.fuse import fuse_initial, fuse_workspace
-from resdepth_colmap.pipeline.fuse_to_file import cloud_before_path, cloud_path
-from resdepth_colmap.pipeline.refine_workspace import RefineReport, refine_workspace
+from resdepth_colmap.pipeline.fuse.stage import fuse_initial, fuse_workspace
+from resdepth_colmap.pipeline.fuse.to_file import cloud_before_path, cloud_path
+from resdepth_colmap.pipeline.refine.stage import RefineReport, refine_workspace
 from resdepth_colmap.pipeline.run_config import RunConfig
-from resdepth_colmap.pipeline.stereo import StereoReport, stereo_workspace
+from resdepth_colmap.pipeline.stereo.stage import StereoReport, stereo_workspace
 from resdepth_colmap.progress import Progress, SilentProgress
 from resdepth_colmap.scene import Scene
 from resdepth_colmap.versions import peak_memory_mb, versions

@@ -11,7 +11,7 @@ from resdepth_colmap.io.colmap.output import OutputWorkspace, read_record
 from resdepth_colmap.io.colmap.workspace import open_workspace
 from resdepth_colmap.io.files import write_whole
 from resdepth_colmap.io.point_cloud import read_cloud
-from resdepth_colmap.pipeline.fuse_to_file import cloud_before_path, cloud_path
+from resdepth_colmap.pipeline.fuse.to_file import cloud_before_path, cloud_path
 from resdepth_colmap.pipeline.pictures import evenly_chosen
 from resdepth_colmap.progress import Progress, SilentProgress
 from resdepth_colmap.report.budget import MOST_BYTES, MOST_IMAGES, Budget

@@ -16,8 +16,16 @@ from torch import Tensor
 from resdepth_colmap.errors import TrainingError
 from resdepth_colmap.geometry.pixels import cropped_K, mirrored_K
 from resdepth_colmap.network.network_config import BLUE, RED, NetworkConfig
-from resdepth_colmap.pipeline.inputs import InputStack, Scaling, network_input
-from resdepth_colmap.pipeline.second_look import SecondLook, Sight, SourceTensors
+from resdepth_colmap.pipeline.refine.network_inputs import (
+    InputStack,
+    Scaling,
+    network_input,
+)
+from resdepth_colmap.pipeline.refine.source_sampler import (
+    SecondLook,
+    Sight,
+    SourceTensors,
+)
 from resdepth_colmap.training.samples import (
     AGAIN,
     COMPLETED,

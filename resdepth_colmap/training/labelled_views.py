@@ -23,11 +23,11 @@ from resdepth_colmap.pipeline.initial_map import (
     check_map_size,
     map_path,
 )
-from resdepth_colmap.pipeline.refine import ViewInputs
-from resdepth_colmap.pipeline.source_maps import NUM_SOURCE_MAPS
-from resdepth_colmap.pipeline.stereo import stereo_workspace
+from resdepth_colmap.pipeline.refine.cross_view import NUM_SOURCE_MAPS
+from resdepth_colmap.pipeline.refine.load_view import view_inputs
+from resdepth_colmap.pipeline.refine.view import ViewInputs
+from resdepth_colmap.pipeline.stereo.stage import stereo_workspace
 from resdepth_colmap.pipeline.view_images import ViewImages
-from resdepth_colmap.pipeline.view_inputs import view_inputs
 from resdepth_colmap.progress import Progress, SilentProgress
 from resdepth_colmap.scene import DepthMap, Scene
 from resdepth_colmap.training.scenes import scene_name

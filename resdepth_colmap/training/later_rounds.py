@@ -10,7 +10,7 @@ from resdepth_colmap.network.inference import for_inference
 from resdepth_colmap.network.network_config import NetworkConfig
 from resdepth_colmap.network.unet import ResDepthNet
 from resdepth_colmap.network.weights import load_weights, weights_hash
-from resdepth_colmap.pipeline.refine import ViewInputs, refine_view
+from resdepth_colmap.pipeline.refine.view import ViewInputs, refine_view
 from resdepth_colmap.progress import Progress, SilentProgress
 from resdepth_colmap.scene import DepthMap
 from resdepth_colmap.training.labelled_views import LabelledView, Loaded, labelled_views

@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 
 from resdepth_colmap.io.files import write_whole
 from resdepth_colmap.network.network_config import NetworkConfig
-from resdepth_colmap.pipeline.inputs import build_inputs
-from resdepth_colmap.pipeline.refine import ViewInputs, view_tensors
-from resdepth_colmap.pipeline.source_maps import FILTERED_SHARE
+from resdepth_colmap.pipeline.refine.cross_view import FILTERED_SHARE
+from resdepth_colmap.pipeline.refine.network_inputs import build_inputs
+from resdepth_colmap.pipeline.refine.view import ViewInputs, view_tensors
 from resdepth_colmap.progress import Progress, SilentProgress
 from resdepth_colmap.scene import DepthMap
 from resdepth_colmap.training.labelled_views import LabelledView, Loaded, labelled_views

@@ -18,7 +18,7 @@ from resdepth_colmap.io.colmap.workspace import open_workspace
 from resdepth_colmap.matching.patch_match import MatchView
 from resdepth_colmap.network.unet import ResDepthNet
 from resdepth_colmap.network.weights import save_weights
-from resdepth_colmap.pipeline.refine_workspace import refine_workspace
+from resdepth_colmap.pipeline.refine.stage import refine_workspace
 from resdepth_colmap.scene import DepthMap, UnitColors
 
 CONFIG = RefineConfig(tile_px=64, overlap_px=16, keep_confirmed=False, rounds=2)

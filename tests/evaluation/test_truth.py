@@ -13,7 +13,7 @@ from resdepth_colmap.evaluation.truth import compare_with_truth
 from resdepth_colmap.io.colmap.depth_map import read_depth_map, write_depth_map
 from resdepth_colmap.io.colmap.output import OutputWorkspace
 from resdepth_colmap.io.colmap.workspace import open_workspace
-from resdepth_colmap.pipeline.refine_workspace import refine_workspace
+from resdepth_colmap.pipeline.refine.stage import refine_workspace
 
 KINDS = dict.fromkeys(NAMES, "geometric")
 

@@ -20,7 +20,7 @@ from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.evaluation.depth_case import CaseOptions, DepthCase
 from resdepth_colmap.evaluation.workspace_cases import read_workspace_cases
 from resdepth_colmap.io.colmap.depth_map import write_depth_map
-from resdepth_colmap.pipeline.source_maps import NUM_SOURCE_MAPS
+from resdepth_colmap.pipeline.refine.cross_view import NUM_SOURCE_MAPS
 
 OPTIONS = CaseOptions(stereo=StereoConfig(max_num_sources=3), num_sources=1)
 

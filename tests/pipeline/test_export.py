@@ -16,7 +16,7 @@ from resdepth_colmap.io.colmap.depth_map import read_depth_map, write_depth_map
 from resdepth_colmap.io.colmap.workspace import open_workspace
 from resdepth_colmap.pipeline.export import export_maps
 from resdepth_colmap.pipeline.export_config import MapFormat
-from resdepth_colmap.pipeline.refine_workspace import refine_workspace
+from resdepth_colmap.pipeline.refine.stage import refine_workspace
 
 
 @pytest.fixture

@@ -16,10 +16,10 @@ from resdepth_colmap.io.colmap.depth_map import read_depth_map, write_depth_map
 from resdepth_colmap.io.colmap.model import read_scene
 from resdepth_colmap.io.colmap.workspace import open_workspace
 from resdepth_colmap.network.weights import load_weights, save_weights
-from resdepth_colmap.pipeline.refine import refine_view
-from resdepth_colmap.pipeline.refine_workspace import RefineReport, refine_workspace
+from resdepth_colmap.pipeline.refine.load_view import view_inputs
+from resdepth_colmap.pipeline.refine.stage import RefineReport, refine_workspace
+from resdepth_colmap.pipeline.refine.view import refine_view
 from resdepth_colmap.pipeline.view_images import ViewImages
-from resdepth_colmap.pipeline.view_inputs import view_inputs
 from resdepth_colmap.progress import Advance
 from resdepth_colmap.scene import DepthMap
 

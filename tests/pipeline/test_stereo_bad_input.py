@@ -16,7 +16,7 @@ from resdepth_colmap.config import StereoBackend, StereoConfig
 from resdepth_colmap.io.colmap.map_file import read_planes
 from resdepth_colmap.io.colmap.model import read_scene
 from resdepth_colmap.io.colmap.workspace import check_images, open_workspace
-from resdepth_colmap.pipeline.stereo import StereoReport, stereo_workspace
+from resdepth_colmap.pipeline.stereo.stage import StereoReport, stereo_workspace
 
 SIZE_PX = (48, 36)
 NEAR, FAR = 2.0, 8.0

@@ -17,7 +17,7 @@ from resdepth_colmap.io.colmap.depth_map import read_depth_map
 from resdepth_colmap.io.colmap.model import read_image_indices, read_scene
 from resdepth_colmap.io.colmap.normal_map import read_normal_map
 from resdepth_colmap.io.colmap.workspace import Workspace, open_workspace
-from resdepth_colmap.pipeline.stereo import StereoReport, stereo_workspace
+from resdepth_colmap.pipeline.stereo.stage import StereoReport, stereo_workspace
 from resdepth_colmap.scene import Scene
 
 

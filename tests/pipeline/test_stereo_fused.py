@@ -14,7 +14,7 @@ from resdepth_colmap.io.colmap.depth_map import read_depth_map
 from resdepth_colmap.io.colmap.model import read_scene
 from resdepth_colmap.io.colmap.workspace import Workspace, open_workspace
 from resdepth_colmap.io.point_cloud import read_cloud
-from resdepth_colmap.pipeline.stereo import stereo_workspace
+from resdepth_colmap.pipeline.stereo.stage import stereo_workspace
 from resdepth_colmap.scene import Scene
 from resdepth_colmap.training.synthesize import synthesize
 

@@ -12,7 +12,7 @@ from noisy_planes import write_noisy_plane
 
 from resdepth_colmap.errors import TrainingError
 from resdepth_colmap.network.network_config import InputVariant, NetworkConfig
-from resdepth_colmap.pipeline.photo_consistency import photo_consistency
+from resdepth_colmap.pipeline.refine.photometric_error import photo_consistency
 from resdepth_colmap.training import crops
 from resdepth_colmap.training.crops import CropSampler
 from resdepth_colmap.training.samples import prepare_samples, read_sample

@@ -7,8 +7,8 @@ import torch
 from torch import Tensor
 
 from resdepth_colmap.network.unet import Refinement
-from resdepth_colmap.pipeline.inputs import Scaling
-from resdepth_colmap.pipeline.second_look import SecondLook
+from resdepth_colmap.pipeline.refine.network_inputs import Scaling
+from resdepth_colmap.pipeline.refine.source_sampler import SecondLook
 from resdepth_colmap.training.crops import Batch
 from resdepth_colmap.training.loss import refinement_loss
 from resdepth_colmap.training.train_config import Preset, TrainConfig

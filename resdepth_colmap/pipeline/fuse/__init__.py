@@ -1,0 +1,1 @@
+"""Stage "fuse": depth maps to one cloud."""

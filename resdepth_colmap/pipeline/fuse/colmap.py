@@ -1,0 +1,116 @@
+"""COLMAP's own fusion of a workspace."""
+
+import contextlib
+import tempfile
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from resdepth_colmap.config import FuseConfig
+from resdepth_colmap.errors import FusionError
+from resdepth_colmap.io.colmap.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.output import KIND
+from resdepth_colmap.io.colmap.workspace import Workspace
+from resdepth_colmap.io.point_cloud import PointCloud, read_cloud
+from resdepth_colmap.pipeline.fuse.geometric_consistency import (
+    Consistent,
+    FuseStatistics,
+)
+from resdepth_colmap.pipeline.fuse.views import MapFiles
+from resdepth_colmap.scene import Scene
+
+
+def fuse_with_colmap(
+    workspace: Workspace,
+    scene: Scene,
+    files: Sequence[MapFiles],
+    config: FuseConfig,
+) -> Consistent:
+    """Run `stereo_fusion` on the geometric maps of a workspace.
+
+    `min_num_views` becomes COLMAP's `min_num_pixels`, which counts pixels, not views.
+    The confidence is not looked at.
+
+    Args:
+        workspace: With maps of that kind, normal maps and cfg files.
+        scene: Its views.
+        files: The maps that are there.
+        config: Thresholds.
+
+    Returns:
+        The cloud, which may be empty, and only the totals of the statistics.
+
+    Raises:
+        FusionError: If the sparse model has no points, or COLMAP fails.
+    """
+    if scene.num_shared_points is None:
+        raise FusionError(
+            f"{workspace.sparse_path}: no sparse points with tracks, but COLMAP's "
+            "fusion finds neighbouring images by the points they share, and would give "
+            "no point; use --fuser open3d, which needs none."
+        )
+    needed = min(config.min_num_views, len(files))
+    cloud = _run(workspace, config, needed)
+    num_pixels = sum(
+        int(np.count_nonzero(read_depth_map(file.depth_path))) for file in files
+    )
+    return Consistent(
+        cloud,
+        FuseStatistics(
+            num_views=len(files),
+            num_views_needed=needed,
+            num_pixels=num_pixels,
+            num_points=len(cloud),
+        ),
+    )
+
+
+def _run(workspace: Workspace, config: FuseConfig, min_num_pixels: int) -> PointCloud:
+    import pycolmap
+
+    with tempfile.TemporaryDirectory() as folder, _quiet(pycolmap):
+        path = Path(folder) / "fused.ply"
+        try:
+            model = pycolmap.stereo_fusion(
+                output_path=path,
+                workspace_path=workspace.path,
+                input_type=KIND,
+                options=_options(pycolmap, config, min_num_pixels),
+                output_type="PLY",
+            )
+        except (ValueError, RuntimeError, IndexError, OSError) as error:
+            reason = " ".join(str(error).split())[:200]
+            raise FusionError(
+                f"{workspace.path}: COLMAP's fusion failed ({reason}); "
+                "use --fuser open3d."
+            ) from error
+        if model.num_points3D() == 0:
+            return _nothing()
+        return read_cloud(path)
+
+
+def _options(pycolmap: Any, config: FuseConfig, min_num_pixels: int) -> Any:
+    options = pycolmap.StereoFusionOptions()
+    options.min_num_pixels = min_num_pixels
+    options.max_depth_error = config.max_depth_error
+    options.max_reproj_error = config.max_reproj_error
+    options.max_normal_error = config.max_normal_error_deg
+    return options
+
+
+def _nothing() -> PointCloud:
+    none = np.zeros((0, 3), np.float32)
+    return PointCloud(points=none, colors=none.astype(np.uint8), normals=none)
+
+
+@contextlib.contextmanager
+def _quiet(pycolmap: Any) -> Iterator[None]:
+    """Keep COLMAP's log off stderr: what matters is raised."""
+    level = pycolmap.logging.minloglevel
+    pycolmap.logging.minloglevel = int(pycolmap.logging.FATAL)
+    try:
+        yield
+    finally:
+        pycolmap.logging.minloglevel = level

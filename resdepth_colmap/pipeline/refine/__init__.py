@@ -1,0 +1,1 @@
+"""Stage "refine": the network over the views of a workspace."""

@@ -1,0 +1,68 @@
+"""One view of a workspace, as arrays ready to be refined."""
+
+from collections.abc import Mapping, Sequence
+
+from resdepth_colmap.geometry.pixels import index_K
+from resdepth_colmap.pipeline.refine.cross_view import SourceMap
+from resdepth_colmap.pipeline.refine.view import SourceView, ViewInputs
+from resdepth_colmap.pipeline.view_images import ViewImages, camera_at_scale
+from resdepth_colmap.scene import DepthMap, Scene, View, cam_from_cam
+
+
+def view_inputs(
+    scene: Scene,
+    index: int,
+    sources: Sequence[int],
+    depth: DepthMap,
+    images: ViewImages,
+    maps: Mapping[int, DepthMap] | None = None,
+) -> ViewInputs:
+    """The view at the size of its map, its sources at the same scale.
+
+    Args:
+        scene: The views.
+        index: Position of the reference in `scene.views`.
+        sources: Positions of its second views, best first.
+        depth: Initial depth, shape (H, W), in units; 0 = hole. It may be smaller than
+            the image.
+        images: Loads the images.
+        maps: Depth maps of other views by their positions, best first, of any size.
+
+    Raises:
+        WorkspaceError: If an image is missing or cannot be read.
+    """
+    view = scene.views[index]
+    height_px, width_px = depth.shape
+    camera = view.camera.resized(width_px, height_px)
+    scale = width_px / view.camera.width_px
+    second_views = []
+    for source_index in sources:
+        source = scene.views[source_index]
+        source_camera = camera_at_scale(source.camera, scale)
+        second_views.append(
+            SourceView(
+                gray=images.gray(source, source_camera),
+                K=index_K(source_camera),
+                source_from_reference=cam_from_cam(source, view),
+            )
+        )
+    return ViewInputs(
+        depth=depth,
+        gray=images.gray(view, camera),
+        colors=images.colors(view, camera),
+        K=index_K(camera),
+        sources=tuple(second_views),
+        source_maps=tuple(
+            _source_map(scene.views[other], view, source_depth)
+            for other, source_depth in (maps or {}).items()
+        ),
+    )
+
+
+def _source_map(source: View, reference: View, depth: DepthMap) -> SourceMap:
+    height_px, width_px = depth.shape
+    return SourceMap(
+        depth=depth,
+        K=index_K(source.camera.resized(width_px, height_px)),
+        source_from_reference=cam_from_cam(source, reference),
+    )

@@ -1,0 +1,278 @@
+"""One view's depth map, refined: arrays in, arrays out."""
+
+import contextlib
+import dataclasses
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from resdepth_colmap.config import RefineConfig
+from resdepth_colmap.geometry.inverse_depth import invert_map
+from resdepth_colmap.geometry.normals import normals_from_depth
+from resdepth_colmap.network.unet import ResDepthNet
+from resdepth_colmap.pipeline.refine.acceptance import KeptDepth
+from resdepth_colmap.pipeline.refine.cross_view import SourceMap, start_from
+from resdepth_colmap.pipeline.refine.network_inputs import (
+    InputStack,
+    ViewTensors,
+    build_inputs,
+    network_input,
+    scaled_look,
+    seen_by_sources,
+)
+from resdepth_colmap.pipeline.refine.source_sampler import SourceTensors
+from resdepth_colmap.pipeline.refine.tiling import Window, apply_tiled, pad_to_multiple
+from resdepth_colmap.scene import (
+    DepthMap,
+    FloatMap,
+    GrayImage,
+    Matrix,
+    NormalMap,
+    UnitColors,
+)
+
+LEAST_INVERSE_RATIO = 0.25
+LARGEST_INVERSE_RATIO = 4.0
+"""The refined inverse depth stays between a quarter of the least and four times the
+largest that was measured."""
+
+CONFIDENT_ERROR = 0.01
+"""Relative error of the depth that the confidence is about."""
+
+LOG_SCALE_LIMIT = 12.0
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
+class SourceView:
+    """A second view.
+
+    Attributes:
+        gray: Its image, of any size, shape (Hs, Ws), in 0..1.
+        K: K for index coordinates of that size, shape (3, 3), in pixels.
+        source_from_reference: Pose, shape (3, 4), translation in units.
+    """
+
+    gray: GrayImage
+    K: Matrix
+    source_from_reference: Matrix
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
+class ViewInputs:
+    """A reference view with its initial depth.
+
+    Attributes:
+        depth: Initial depth, shape (H, W), in units; 0 = hole.
+        gray: The image at the size of the depth map, shape (H, W), in 0..1.
+        colors: The same in colour, RGB, shape (H, W, 3), in 0..1; None = it has none.
+        K: K for index coordinates at that size, shape (3, 3), in pixels.
+        sources: Second views, best first; may be empty.
+        source_maps: Depth maps of other views, the first that of the best; may be
+            empty.
+    """
+
+    depth: DepthMap
+    gray: GrayImage
+    K: Matrix
+    sources: tuple[SourceView, ...] = ()
+    source_maps: tuple[SourceMap, ...] = ()
+    colors: UnitColors | None = None
+
+    def __post_init__(self) -> None:
+        """Check that image and depth map have one size."""
+        if self.gray.shape != self.depth.shape:
+            raise ValueError(
+                f"{self.gray.shape=} but expected that of the depth map, "
+                f"{self.depth.shape}."
+            )
+        if self.colors is not None and self.colors.shape != (*self.depth.shape, 3):
+            raise ValueError(
+                f"{self.colors.shape=} but expected RGB values of the size of the "
+                f"depth map, {self.depth.shape}."
+            )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
+class RefinedView:
+    """A refined depth map.
+
+    Attributes:
+        depth: Shape (H, W), float32, in units, > 0 everywhere.
+        normals: Camera frame, towards the camera, shape (H, W, 3), float32.
+        confidence: Probability in 0..1 that the depth is within 1 % of the truth, by
+            the network's own estimate of its error, shape (H, W), float32. From a
+            network that makes none: the correlation with the best source, at least 0.
+    """
+
+    depth: DepthMap
+    normals: NormalMap
+    confidence: FloatMap
+
+
+def refine_view(
+    view: ViewInputs, network: ResDepthNet, config: RefineConfig
+) -> RefinedView:
+    """Refine a depth map: fill, warp, run the network tile by tile, and again.
+
+    Each pass warps the sources anew with the depth of the pass before. The mask of real
+    pixels stays that of the first: it tells the network what was measured. A measured
+    depth that a map of another view confirms is kept, and one that the photographs
+    confirm, where the network would change it only a little and the photographs speak
+    against it. Nor is a change taken that is small beside the error that the network
+    itself expects (docs/adr/0006, 0016 and 0018).
+
+    Args:
+        view: Initial depth, images and poses; sources that the network does not take
+            are not used, missing ones are shown to it as black.
+        network: On the device to run on.
+        config: Passes and tiles.
+
+    Returns:
+        Depth, normals and confidence.
+
+    Raises:
+        ValueError: If the initial depth map has no valid pixel.
+    """
+    device = next(network.parameters()).device
+    with _inference(network):
+        tensors = view_tensors(view, device, network.config.source_depth)
+        measured = tensors.inverse_depth[tensors.valid]
+        low = float(measured.min()) * LEAST_INVERSE_RATIO
+        high = float(measured.max()) * LARGEST_INVERSE_RATIO
+        initial = tensors.inverse_depth
+        num_sources = network.config.num_sources
+        seen = seen_by_sources(tensors, num_sources)
+        kept_depth = KeptDepth(tensors, num_sources, seen.consistency)
+        for number in range(config.passes):
+            if number > 0:
+                seen = seen_by_sources(tensors, num_sources)
+            stack = build_inputs(tensors, network.config, seen)
+            outputs = _run_tiled(stack, network, config).to(device)[None]
+            refined = (tensors.inverse_depth + outputs[:, :1]).clamp(low, high)
+            error = outputs[:, 1:2] if network.config.confidence else None
+            if config.keep_confirmed:
+                is_kept = kept_depth.is_kept(refined, error)
+                refined = torch.where(is_kept, initial, refined)
+            tensors = tensors._replace(inverse_depth=refined)
+        if error is not None:
+            confidence = 1.0 - torch.exp(-CONFIDENT_ERROR * refined / error)
+        else:
+            confidence = _correlation(tensors, network.config.num_sources)
+    depth = invert_map(_array(refined))
+    return RefinedView(
+        depth=depth,
+        normals=normals_from_depth(depth, view.K),
+        confidence=_array(confidence),
+    )
+
+
+@contextlib.contextmanager
+def _inference(network: ResDepthNet) -> Iterator[None]:
+    """No gradients, and batch norm with its learned statistics; then as before."""
+    was_training = network.training
+    network.eval()
+    try:
+        with torch.inference_mode():
+            yield
+    finally:
+        network.train(was_training)
+
+
+def _run_tiled(stack: InputStack, network: ResDepthNet, config: RefineConfig) -> Tensor:
+    """Change of the inverse depth, and its expected error if the network tells it.
+
+    Shape (1 or 2, H, W), in 1/unit. The change, not the result: a network that changes
+    nothing then returns its input exactly, however the tiles are scaled and blended.
+    """
+
+    def run_tile(window: Window) -> Tensor:
+        return _refine_tile(stack.crop(*window), network)[0]
+
+    multiple_px = network.config.multiple_px
+    tile_px = -(-config.tile_px // multiple_px) * multiple_px
+    height_px, width_px = stack.inverse_depth.shape[-2:]
+    return apply_tiled(run_tile, (height_px, width_px), tile_px, config.overlap_px)
+
+
+def _refine_tile(tile: InputStack, network: ResDepthNet) -> Tensor:
+    """What `_run_tiled` returns, of one tile of any size, shape (1, 1 or 2, h, w)."""
+    channels, scaling = network_input(tile, network.config)
+    padded = pad_to_multiple(channels, network.config.multiple_px)
+    padded = padded.contiguous(memory_format=torch.channels_last)
+    output = network(padded, scaled_look(tile, scaling))
+    height_px, width_px = channels.shape[-2:]
+    refined = output.inverse_depth[..., :height_px, :width_px]
+    if network.config.residual:
+        change = (refined - channels[:, :1]) * scaling.scale
+    else:
+        change = scaling.restore(refined) - tile.inverse_depth
+    change = torch.nan_to_num(change, nan=0.0, posinf=0.0, neginf=0.0)
+    if output.log_scale is None:
+        return change
+    log_scale = output.log_scale[..., :height_px, :width_px]
+    log_scale = torch.nan_to_num(log_scale, nan=LOG_SCALE_LIMIT)
+    log_scale = log_scale.clamp(-LOG_SCALE_LIMIT, LOG_SCALE_LIMIT)
+    return torch.cat([change, torch.exp(log_scale) * scaling.scale], dim=1)
+
+
+def view_tensors(view: ViewInputs, device: torch.device, use_maps: bool) -> ViewTensors:
+    """A view as tensors on a device, a batch of one.
+
+    Args:
+        view: The view.
+        device: Where to.
+        use_maps: Look at the maps of other views.
+
+    Raises:
+        ValueError: If the initial depth map has no valid pixel.
+    """
+    start = start_from(view.depth, view.K, view.source_maps if use_maps else ())
+    return ViewTensors(
+        inverse_depth=_image(start.inverse_depth, device),
+        valid=_mask(start.valid, device),
+        gray=_image(view.gray, device),
+        colors=None if view.colors is None else _colors(view.colors, device),
+        K=torch.from_numpy(view.K)[None],
+        sources=tuple(
+            SourceTensors(
+                _image(source.gray, device),
+                torch.from_numpy(source.K)[None],
+                torch.from_numpy(source.source_from_reference)[None],
+            )
+            for source in view.sources
+        ),
+        carried=_map(start.carried, device),
+        num_confirming=_map(start.num_confirming, device),
+        is_filtered=start.is_filtered,
+    )
+
+
+def _image(gray: GrayImage, device: torch.device) -> Tensor:
+    return torch.from_numpy(np.array(gray, dtype=np.float32))[None, None].to(device)
+
+
+def _colors(colors: UnitColors, device: torch.device) -> Tensor:
+    planes = np.ascontiguousarray(colors.transpose(2, 0, 1), dtype=np.float32)
+    return torch.from_numpy(planes)[None].to(device)
+
+
+def _mask(flags: NDArray[np.bool_], device: torch.device) -> Tensor:
+    return torch.from_numpy(flags)[None, None].to(device)
+
+
+def _map(values: NDArray[Any] | None, device: torch.device) -> Tensor | None:
+    return None if values is None else torch.from_numpy(values)[None, None].to(device)
+
+
+def _correlation(tensors: ViewTensors, num_sources: int) -> Tensor:
+    badness = seen_by_sources(tensors, num_sources).consistency
+    return (1.0 - 2.0 * badness).clamp(min=0.0)
+
+
+def _array(values: Tensor) -> FloatMap:
+    array: FloatMap = values[0, 0].cpu().numpy()
+    return array

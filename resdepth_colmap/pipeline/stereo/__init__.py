@@ -1,0 +1,1 @@
+"""Stage "stereo": initial depth and normal maps, by PatchMatch."""

@@ -1,0 +1,78 @@
+"""Laws of the depth ranges that small pictures show."""
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+from planes import plane_views
+from workspaces import plane_folder
+
+from resdepth_colmap.config import StereoConfig
+from resdepth_colmap.geometry.pixels import index_K
+from resdepth_colmap.io.colmap.model import read_scene
+from resdepth_colmap.io.colmap.workspace import open_workspace
+from resdepth_colmap.matching.patch_match import MatchView
+from resdepth_colmap.pipeline.stereo import passes as stereo_passes
+from resdepth_colmap.pipeline.stereo.depth_range_probe import sketched_range
+from resdepth_colmap.pipeline.stereo.ledger import StereoLedger
+from resdepth_colmap.pipeline.stereo.passes import StereoPass, ViewMatcher
+from resdepth_colmap.pipeline.stereo.plan import plan_stereo
+
+WIDE = (0.3, 300.0)
+PLANE = plane_views()
+VIEWS = [
+    MatchView(
+        gray=(view.image.mean(axis=2) / 255).astype(np.float32),
+        K=index_K(view.view.camera),
+        cam_from_world=view.view.cam_from_world,
+    )
+    for view in PLANE
+]
+
+
+def test_the_range_is_that_of_the_surface_stretched() -> None:
+    near, far = sketched_range(VIEWS[0], VIEWS[1:], WIDE, StereoConfig())
+    depth = PLANE[0].depth
+    assert depth.min() / 2 < near < np.percentile(depth, 5)
+    assert np.percentile(depth, 95) < far < depth.max() * 5
+
+
+def test_where_nothing_is_seen_the_range_stays_wide() -> None:
+    grey = [dataclasses.replace(v, gray=np.full_like(v.gray, 0.5)) for v in VIEWS]
+    assert sketched_range(grey[0], grey[1:], WIDE, StereoConfig()) == WIDE
+
+
+@pytest.mark.parametrize(
+    ("num_points", "options", "is_sketched"),
+    [
+        (0, {}, True),
+        (200, {}, False),  # COLMAP's rule
+        (0, {"depth_min": 0.3, "depth_max": 300.0}, False),  # the user's word
+    ],
+)
+def test_only_a_guess_is_narrowed_and_but_once(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    num_points: int,
+    options: dict[str, float],
+    is_sketched: bool,
+) -> None:
+    sizes: list[tuple[int, ...]] = []
+
+    def sketch(reference: MatchView, *_: object) -> tuple[float, float]:
+        sizes.append(reference.gray.shape)
+        return 2.0, 8.0
+
+    monkeypatch.setattr(stereo_passes, "sketched_range", sketch)
+    monkeypatch.setattr(stereo_passes, "SIDE_PX", 40)
+    folder = plane_folder(tmp_path, kinds=(), num_points=num_points)
+    workspace = open_workspace(folder)
+    scene = read_scene(workspace.sparse_path, workspace.images_path, workspace.path)
+    config = StereoConfig(num_iterations=1, **options)  # type: ignore[arg-type] # floats
+    plans, _ = plan_stereo(workspace, scene, config)
+    matcher = ViewMatcher(workspace, scene, config, StereoLedger(workspace))
+    which = StereoPass(kind="photometric", is_filtered=False)
+    for _ in range(2):
+        matcher.match(plans[0], which, lambda _: None)
+    assert sizes == ([(30, 40)] if is_sketched else [])
