@@ -34,7 +34,7 @@ def info(workspace: Path, as_json: bool, **values: Any) -> None:
     from resdepth_colmap.cli.printed import show_inspection
     from resdepth_colmap.io.colmap.model import read_scene
     from resdepth_colmap.io.colmap.workspace import open_workspace
-    from resdepth_colmap.pipeline.inspect import inspect_workspace
+    from resdepth_colmap.pipeline.info import inspect_workspace
 
     opened = open_workspace(workspace)
     scene = read_scene(opened.sparse_path, opened.images_path, opened.path)

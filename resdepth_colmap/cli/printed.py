@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
     from resdepth_colmap.evaluation.depth_metrics import DepthMetrics
     from resdepth_colmap.evaluation.truth import Comparison
-    from resdepth_colmap.pipeline.inspect import Inspection
+    from resdepth_colmap.pipeline.info import Inspection
     from resdepth_colmap.pipeline.run import RunResult
 
 LABEL_WIDTH = 16

@@ -12,7 +12,7 @@ from resdepth_colmap.config import RefineConfig, StereoBackend
 from resdepth_colmap.io.colmap.depth_map import read_depth_map, write_depth_map
 from resdepth_colmap.io.colmap.model import read_scene
 from resdepth_colmap.io.colmap.workspace import open_workspace
-from resdepth_colmap.pipeline.inspect import Inspection, inspect_workspace
+from resdepth_colmap.pipeline.info import Inspection, inspect_workspace
 
 
 def inspect(folder: Path, config: RefineConfig | None = None) -> Inspection:
