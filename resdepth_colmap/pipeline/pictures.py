@@ -11,7 +11,11 @@ import numpy as np
 from resdepth_colmap.io.colmap.depth_map import read_depth_map
 from resdepth_colmap.io.colmap.output import OutputWorkspace
 from resdepth_colmap.io.images import read_rgb, write_png
-from resdepth_colmap.pipeline.canvas import (
+from resdepth_colmap.pipeline.initial_map import map_path
+from resdepth_colmap.pipeline.refine.stage import RefineReport
+from resdepth_colmap.progress import Progress
+from resdepth_colmap.scene import ColorImage, DepthMap, Scene
+from resdepth_colmap.viz.canvas import (
     BAR_HEIGHT_PX,
     BAR_LABEL_HEIGHT_PX,
     Canvas,
@@ -19,16 +23,12 @@ from resdepth_colmap.pipeline.canvas import (
     resized,
     shortened,
 )
-from resdepth_colmap.pipeline.depth_colors import (
+from resdepth_colmap.viz.colormaps import (
     DEPTH_COLORS,
     DepthScale,
     relative_difference,
 )
-from resdepth_colmap.pipeline.depth_strip import BeforeAfter, depth_strip, filled_share
-from resdepth_colmap.pipeline.initial_map import map_path
-from resdepth_colmap.pipeline.refine.stage import RefineReport
-from resdepth_colmap.progress import Progress
-from resdepth_colmap.scene import ColorImage, DepthMap, Scene
+from resdepth_colmap.viz.strips import BeforeAfter, depth_strip, filled_share
 
 FOLDER = "pictures"
 OVERVIEW_NAME = "overview.png"

@@ -6,13 +6,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from resdepth_colmap.io.point_cloud import PointCloud
-from resdepth_colmap.pipeline.depth_colors import (
-    DEPTH_COLORS,
-    DIFFERENCE_COLORS,
-    ERROR_COLORS,
-    ERROR_RANGE,
-    color_bar,
-)
 from resdepth_colmap.report.budget import Budget
 from resdepth_colmap.report.cloud_data import (
     SIZE,
@@ -30,6 +23,13 @@ from resdepth_colmap.report.packing import (
     packed_photo,
 )
 from resdepth_colmap.scene import View
+from resdepth_colmap.viz.colormaps import (
+    DEPTH_COLORS,
+    DIFFERENCE_COLORS,
+    ERROR_COLORS,
+    ERROR_RANGE,
+    color_bar,
+)
 
 CONFIDENCE_COLORS = "viridis"
 

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from resdepth_colmap.evaluation.depth_metrics import depth_metrics
-from resdepth_colmap.pipeline.depth_colors import (
+from resdepth_colmap.report.image_maps import ImageMaps
+from resdepth_colmap.viz.colormaps import (
     DepthScale,
     difference_limit,
     relative_difference,
 )
-from resdepth_colmap.report.image_maps import ImageMaps
 
 MOST_NAMED = 100
 _DIGITS = 6

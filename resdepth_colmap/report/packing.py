@@ -12,8 +12,8 @@ import numpy.typing as npt
 from PIL import Image
 
 from resdepth_colmap.io.png import encode_png
-from resdepth_colmap.pipeline.canvas import fitted_size, resized
 from resdepth_colmap.scene import ColorImage, DepthMap, FloatMap
+from resdepth_colmap.viz.canvas import fitted_size, resized
 
 MAX_VALUE = 65535
 CONFIDENCE_LEVELS = 63

@@ -13,7 +13,6 @@ import torch
 from resdepth_colmap.errors import TrainingError
 from resdepth_colmap.io.images import write_png
 from resdepth_colmap.network.network_config import NetworkConfig
-from resdepth_colmap.pipeline.depth_strip import BeforeAfter, depth_strip
 from resdepth_colmap.progress import Advance, Progress, SilentProgress
 from resdepth_colmap.training.beginning import fresh_network
 from resdepth_colmap.training.checkpoint import (
@@ -33,6 +32,7 @@ from resdepth_colmap.training.stop_request import StopRequest, stop_request
 from resdepth_colmap.training.train_config import TrainConfig
 from resdepth_colmap.training.training_log import Row, TrainingLog
 from resdepth_colmap.training.validation import mean_loss
+from resdepth_colmap.viz.strips import BeforeAfter, depth_strip
 
 logger = logging.getLogger(__name__)
 

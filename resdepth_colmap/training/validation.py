@@ -12,13 +12,13 @@ import torch
 from resdepth_colmap.config import RefineConfig
 from resdepth_colmap.io.images import read_rgb
 from resdepth_colmap.network.unet import ResDepthNet
-from resdepth_colmap.pipeline.depth_strip import BeforeAfter
 from resdepth_colmap.pipeline.refine.view import refine_view
 from resdepth_colmap.scene import DepthMap
 from resdepth_colmap.training.crops import CropSampler
 from resdepth_colmap.training.labelled_views import LabelledView, labelled_views
 from resdepth_colmap.training.loss import refinement_loss
 from resdepth_colmap.training.train_config import TrainConfig
+from resdepth_colmap.viz.strips import BeforeAfter
 
 NUM_BATCHES = 8
 NUM_PICTURES = 2

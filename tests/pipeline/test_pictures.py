@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from resdepth_colmap.pipeline.canvas import Canvas, fitted_size, resized, shortened
-from resdepth_colmap.pipeline.depth_colors import HOLE_COLOR, DepthScale
-from resdepth_colmap.pipeline.depth_strip import BeforeAfter, depth_strip
 from resdepth_colmap.pipeline.pictures import evenly_chosen, overview
 from resdepth_colmap.scene import ColorImage, DepthMap
+from resdepth_colmap.viz.canvas import Canvas, fitted_size, resized, shortened
+from resdepth_colmap.viz.colormaps import HOLE_COLOR, DepthScale
+from resdepth_colmap.viz.strips import BeforeAfter, depth_strip
 
 PHOTO_COLOR = (255, 0, 255)
 

@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from resdepth_colmap.pipeline.depth_colors import (
+from resdepth_colmap.scene import DepthMap
+from resdepth_colmap.viz.colormaps import (
     ERROR_COLORS,
     HOLE_COLOR,
     DepthScale,
@@ -15,7 +16,6 @@ from resdepth_colmap.pipeline.depth_colors import (
     difference_limit,
     relative_difference,
 )
-from resdepth_colmap.scene import DepthMap
 
 
 def _map(seed: int) -> DepthMap:

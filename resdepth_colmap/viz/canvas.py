@@ -14,8 +14,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from resdepth_colmap.pipeline.depth_colors import HOLE_COLOR, color_bar
 from resdepth_colmap.scene import ColorImage
+from resdepth_colmap.viz.colormaps import HOLE_COLOR, color_bar
 
 _DPI = 100
 _POINTS_PER_PX = 72 / _DPI

@@ -5,7 +5,8 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from resdepth_colmap.pipeline.canvas import (
+from resdepth_colmap.scene import ColorImage, DepthMap, FloatMap
+from resdepth_colmap.viz.canvas import (
     BAR_HEIGHT_PX,
     BAR_LABEL_HEIGHT_PX,
     Canvas,
@@ -13,7 +14,7 @@ from resdepth_colmap.pipeline.canvas import (
     resized,
     shortened,
 )
-from resdepth_colmap.pipeline.depth_colors import (
+from resdepth_colmap.viz.colormaps import (
     DEPTH_COLORS,
     DIFFERENCE_COLORS,
     ERROR_COLORS,
@@ -23,7 +24,6 @@ from resdepth_colmap.pipeline.depth_colors import (
     difference_limit,
     relative_difference,
 )
-from resdepth_colmap.scene import ColorImage, DepthMap, FloatMap
 
 PANEL_LONG_SIDE_PX = 480
 LEAST_PANEL_WIDTH_PX = 250  # the words above a panel need as much
