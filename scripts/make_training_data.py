@@ -23,7 +23,7 @@ def make_room(output: Path, seed: int) -> str:
     from resdepth_colmap.io.colmap.model import read_scene
     from resdepth_colmap.io.colmap.workspace import open_workspace
     from resdepth_colmap.pipeline.stereo.stage import stereo_workspace
-    from resdepth_colmap.training.synthesize import synthesize
+    from resdepth_colmap.synthetic.synthesize import synthesize
 
     config = SynthesisConfig(
         num_views=VIEW_COUNTS[seed % len(VIEW_COUNTS)],

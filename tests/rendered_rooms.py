@@ -5,10 +5,10 @@ from typing import Any
 from unittest import mock
 
 from resdepth_colmap.config import SynthesisConfig
-from resdepth_colmap.training import synthesize
-from resdepth_colmap.training.render import Tracer
-from resdepth_colmap.training.room import Room
-from resdepth_colmap.training.synthesize import RenderedScene
+from resdepth_colmap.synthetic import synthesize
+from resdepth_colmap.synthetic.render import Tracer
+from resdepth_colmap.synthetic.room import Room
+from resdepth_colmap.synthetic.synthesize import RenderedScene
 
 CONFIG = SynthesisConfig(num_views=2, width_px=96, height_px=64)
 SEED = 3

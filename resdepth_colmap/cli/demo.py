@@ -34,7 +34,7 @@ def demo(output: Path, **values: Any) -> None:
     from resdepth_colmap.cli.printed import show_comparison, show_run
     from resdepth_colmap.evaluation.truth import compare_with_truth
     from resdepth_colmap.report.refine_and_report import refine_and_report
-    from resdepth_colmap.training.synthesize import synthesize
+    from resdepth_colmap.synthetic.synthesize import synthesize
 
     progress = BarProgress()
     with progress.stage("Rendering", 1) as advance:

@@ -30,7 +30,7 @@ def synthesize(output: Path, workers: int, **values: Any) -> None:
     """
     config = build_config(SynthesisConfig, values)
     from resdepth_colmap.cli.log import BarProgress
-    from resdepth_colmap.training.synthesize import synthesize as render
+    from resdepth_colmap.synthetic.synthesize import synthesize as render
 
     with BarProgress().stage("Rendering", config.num_scenes) as advance:
         paths = render(output, config, lambda _done, _total: advance(1), workers)

@@ -1,1 +1,1 @@
-"""Rendered rooms and the training on them."""
+"""Training the network on views whose depth is known."""

@@ -25,9 +25,9 @@ from resdepth_colmap.training.checkpoint import (
 )
 from resdepth_colmap.training.crops import Batch
 from resdepth_colmap.training.curves import draw_curves
-from resdepth_colmap.training.data import Data, Places, prepare_data
 from resdepth_colmap.training.optimisation import Optimisation
 from resdepth_colmap.training.ranks import join_ranks
+from resdepth_colmap.training.sets import Data, Places, prepare_data
 from resdepth_colmap.training.stop_request import StopRequest, stop_request
 from resdepth_colmap.training.train_config import TrainConfig
 from resdepth_colmap.training.training_log import Row, TrainingLog

@@ -16,7 +16,7 @@ from resdepth_colmap.io.colmap.workspace import Workspace, open_workspace
 from resdepth_colmap.io.point_cloud import read_cloud
 from resdepth_colmap.pipeline.stereo.stage import stereo_workspace
 from resdepth_colmap.scene import Scene
-from resdepth_colmap.training.synthesize import synthesize
+from resdepth_colmap.synthetic.synthesize import synthesize
 
 
 def matched(folder: Path, **options: object) -> tuple[Workspace, Scene]:

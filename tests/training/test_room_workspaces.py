@@ -17,8 +17,8 @@ from resdepth_colmap.io.colmap.model import read_scene
 from resdepth_colmap.io.colmap.workspace import check_images, open_workspace
 from resdepth_colmap.io.images import read_rgb
 from resdepth_colmap.scene import Matrix, cam_from_cam
-from resdepth_colmap.training import synthesize as module
-from resdepth_colmap.training.synthesize import (
+from resdepth_colmap.synthetic import synthesize as module
+from resdepth_colmap.synthetic.synthesize import (
     RenderedScene,
     synthesize,
     write_scene,

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from resdepth_colmap.training.patterns import REPEATED
-from resdepth_colmap.training.textures import RICH, WEAK, Maker, Picture
+from resdepth_colmap.synthetic.patterns import REPEATED
+from resdepth_colmap.synthetic.textures import RICH, WEAK, Maker, Picture
 
 SIZE = 128
 # a printed page has edges of its own, where it meets the next one

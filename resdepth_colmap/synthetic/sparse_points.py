@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from resdepth_colmap.scene import ColorImage, DepthMap, Matrix, View
-from resdepth_colmap.training.textures import Rng
+from resdepth_colmap.synthetic.textures import Rng
 
 _SAME_SURFACE = 0.01  # relative difference of depth
 _NOISE_OF_DEPTH = 0.0005

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from resdepth_colmap.scene import Matrix
-from resdepth_colmap.training.meshes import Mesh, Rng
-from resdepth_colmap.training.patterns import random_texture
+from resdepth_colmap.synthetic.meshes import Mesh, Rng
+from resdepth_colmap.synthetic.patterns import random_texture
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)

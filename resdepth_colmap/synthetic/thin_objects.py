@@ -3,8 +3,8 @@
 import numpy as np
 
 from resdepth_colmap.scene import Matrix
-from resdepth_colmap.training import meshes, objects
-from resdepth_colmap.training.meshes import Mesh, Rng, merge
+from resdepth_colmap.synthetic import meshes, objects
+from resdepth_colmap.synthetic.meshes import Mesh, Rng, merge
 
 
 def pipes(rng: Rng) -> Mesh:

@@ -14,11 +14,11 @@ from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.io.colmap.depth_map import write_depth_map
 from resdepth_colmap.io.images import write_png
 from resdepth_colmap.scene import ColorImage, DepthMap, View
-from resdepth_colmap.training.render import Tracer
-from resdepth_colmap.training.room import Style, furnish
-from resdepth_colmap.training.sensor import Sensor
-from resdepth_colmap.training.sparse_points import SparsePoints, sample_points
-from resdepth_colmap.training.viewpoints import choose_views
+from resdepth_colmap.synthetic.render import Tracer
+from resdepth_colmap.synthetic.room import Style, furnish
+from resdepth_colmap.synthetic.sensor import Sensor
+from resdepth_colmap.synthetic.sparse_points import SparsePoints, sample_points
+from resdepth_colmap.synthetic.viewpoints import choose_views
 
 Progress = Callable[[int, int], None]
 """Told after each scene: how many are done, of how many."""

@@ -9,8 +9,8 @@ import numpy as np
 from PIL import Image
 
 from resdepth_colmap.scene import ColorImage
-from resdepth_colmap.training.render import Floats
-from resdepth_colmap.training.textures import Rng
+from resdepth_colmap.synthetic.render import Floats
+from resdepth_colmap.synthetic.textures import Rng
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -5,9 +5,9 @@ import dataclasses
 import numpy as np
 
 from resdepth_colmap.scene import Matrix
-from resdepth_colmap.training import meshes, objects, thin_objects
-from resdepth_colmap.training.furnisher import Furnisher
-from resdepth_colmap.training.meshes import Mesh, Rng
+from resdepth_colmap.synthetic import meshes, objects, thin_objects
+from resdepth_colmap.synthetic.meshes import Mesh, Rng
+from resdepth_colmap.synthetic.scene_builder import Furnisher
 
 _CELL = 0.15  # metres between points where light is baked
 _UP = np.array([0.0, 0.0, 1.0])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from resdepth_colmap.training import patterns, textures
+from resdepth_colmap.synthetic import patterns, textures
 
 MAKERS = [*dict.fromkeys([*textures.WEAK, *textures.RICH, *patterns.REPEATED])]
 

@@ -7,8 +7,8 @@ import numpy as np
 
 from resdepth_colmap.config import SynthesisConfig
 from resdepth_colmap.scene import Camera, DepthMap, Matrix, View
-from resdepth_colmap.training.meshes import Rng
-from resdepth_colmap.training.room import Room, Style
+from resdepth_colmap.synthetic.meshes import Rng
+from resdepth_colmap.synthetic.room import Room, Style
 
 Probe = Callable[[View], DepthMap]
 

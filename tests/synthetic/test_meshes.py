@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from resdepth_colmap.training import meshes, objects, thin_objects
+from resdepth_colmap.synthetic import meshes, objects, thin_objects
 
 BUILDERS = sorted(
     {*objects.SMALL, *thin_objects.THIN, *thin_objects.FURNITURE},

@@ -8,8 +8,8 @@ import numpy.typing as npt
 
 from resdepth_colmap.io.open3d_library import load_open3d
 from resdepth_colmap.scene import DepthMap, View
-from resdepth_colmap.training.room import Light, Room
-from resdepth_colmap.training.texture_atlas import Atlas
+from resdepth_colmap.synthetic.room import Light, Room
+from resdepth_colmap.synthetic.texture_atlas import Atlas
 
 o3d = load_open3d()
 

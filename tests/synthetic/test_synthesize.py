@@ -11,8 +11,8 @@ from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.io.colmap.depth_map import read_depth_map
 from resdepth_colmap.io.images import read_rgb
 from resdepth_colmap.scene import DepthMap, Matrix, View
-from resdepth_colmap.training.room import Style
-from resdepth_colmap.training.synthesize import (
+from resdepth_colmap.synthetic.room import Style
+from resdepth_colmap.synthetic.synthesize import (
     RenderedScene,
     render_room,
     synthesize,

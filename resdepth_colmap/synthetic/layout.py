@@ -5,11 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from resdepth_colmap.scene import Matrix
-from resdepth_colmap.training import meshes, objects, thin_objects
-from resdepth_colmap.training.furnisher import Furnisher
-from resdepth_colmap.training.meshes import Mesh, Rng
-from resdepth_colmap.training.objects import SMALL, Builder
-from resdepth_colmap.training.thin_objects import FURNITURE, THIN
+from resdepth_colmap.synthetic import meshes, objects, thin_objects
+from resdepth_colmap.synthetic.meshes import Mesh, Rng
+from resdepth_colmap.synthetic.objects import SMALL, Builder
+from resdepth_colmap.synthetic.scene_builder import Furnisher
+from resdepth_colmap.synthetic.thin_objects import FURNITURE, THIN
 
 _ROWS: tuple[Builder, ...] = (objects.books, objects.pile)
 _BEHIND_TABLES: tuple[Builder, ...] = (

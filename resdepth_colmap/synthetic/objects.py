@@ -8,8 +8,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from resdepth_colmap.training import meshes
-from resdepth_colmap.training.meshes import Mesh, Rng, merge
+from resdepth_colmap.synthetic import meshes
+from resdepth_colmap.synthetic.meshes import Mesh, Rng, merge
 
 Builder = Callable[[Rng], Mesh]
 

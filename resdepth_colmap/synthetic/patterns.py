@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 
-from resdepth_colmap.training.textures import (
+from resdepth_colmap.synthetic.textures import (
     RICH,
     WEAK,
     Field,

@@ -6,12 +6,12 @@ import enum
 import numpy as np
 
 from resdepth_colmap.scene import Matrix
-from resdepth_colmap.training import meshes
-from resdepth_colmap.training.arrangement import fill_room, hang_things, lay_table
-from resdepth_colmap.training.furnisher import Furnisher, Material
-from resdepth_colmap.training.meshes import Mesh, Rng
-from resdepth_colmap.training.textures import Picture
-from resdepth_colmap.training.walls import add_shell, dress_walls
+from resdepth_colmap.synthetic import meshes
+from resdepth_colmap.synthetic.layout import fill_room, hang_things, lay_table
+from resdepth_colmap.synthetic.meshes import Mesh, Rng
+from resdepth_colmap.synthetic.scene_builder import Furnisher, Material
+from resdepth_colmap.synthetic.textures import Picture
+from resdepth_colmap.synthetic.walls import add_shell, dress_walls
 
 
 class Style(enum.StrEnum):

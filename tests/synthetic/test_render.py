@@ -8,10 +8,10 @@ from analytic_scene import depth_of_plane, turned, view_at
 from rendered_rooms import room_of
 
 from resdepth_colmap.scene import Camera, View
-from resdepth_colmap.training import meshes
-from resdepth_colmap.training.meshes import Mesh
-from resdepth_colmap.training.render import Tracer
-from resdepth_colmap.training.room import Light, Room, Style
+from resdepth_colmap.synthetic import meshes
+from resdepth_colmap.synthetic.meshes import Mesh
+from resdepth_colmap.synthetic.render import Tracer
+from resdepth_colmap.synthetic.room import Light, Room, Style
 
 CAMERA = Camera(width_px=48, height_px=32, fx=40.0, fy=42.0, cx=23.0, cy=16.7)
 WIDE = Camera(width_px=32, height_px=32, fx=16.0, fy=16.0, cx=16.0, cy=16.0)

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from resdepth_colmap.training.textures import Picture
+from resdepth_colmap.synthetic.textures import Picture
 
 Floats = npt.NDArray[np.float32]
 Indices = npt.NDArray[np.int64]

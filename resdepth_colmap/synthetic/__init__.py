@@ -1,0 +1,1 @@
+"""Rendered rooms and objects with exact depth; knows nothing of training."""

@@ -1,0 +1,1 @@
+"""What is trained on: scenes, labelled views, samples, crops."""
