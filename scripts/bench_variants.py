@@ -43,15 +43,15 @@ from resdepth_colmap.network.weights import load_weights
 from resdepth_colmap.pipeline.initial_map import choose_initial_map
 from resdepth_colmap.pipeline.refine.view import ViewInputs, refine_view
 from resdepth_colmap.scene import DepthMap
-from resdepth_colmap.training.labelled_views import labelled_views
-from resdepth_colmap.training.loop import train
-from resdepth_colmap.training.scenes import (
+from resdepth_colmap.training.config import Preset, Schedule, TrainConfig
+from resdepth_colmap.training.data.labelled_views import labelled_views
+from resdepth_colmap.training.data.scenes import (
     check_apart,
     find_scenes,
     scene_name,
     split_scenes,
 )
-from resdepth_colmap.training.train_config import Preset, Schedule, TrainConfig
+from resdepth_colmap.training.loop import train
 from resdepth_colmap.versions import versions
 
 REPOSITORY = Path(__file__).resolve().parents[1]

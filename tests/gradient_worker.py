@@ -12,11 +12,11 @@ import torch
 
 from resdepth_colmap.config import Device
 from resdepth_colmap.network.weights import load_weights
-from resdepth_colmap.training.beginning import fresh_network
-from resdepth_colmap.training.crops import CropSampler
-from resdepth_colmap.training.optimisation import Optimisation
-from resdepth_colmap.training.ranks import join_ranks
-from resdepth_colmap.training.train_config import TrainConfig
+from resdepth_colmap.training.config import TrainConfig
+from resdepth_colmap.training.data.crops import CropSampler
+from resdepth_colmap.training.distributed import join_ranks
+from resdepth_colmap.training.initialisation import fresh_network
+from resdepth_colmap.training.optimizer import Optimisation
 
 
 def take_step(samples: Path, weights: Path, output: Path) -> None:

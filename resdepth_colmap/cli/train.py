@@ -12,7 +12,7 @@ from resdepth_colmap.cli.options import (
     given_values,
 )
 from resdepth_colmap.network.network_config import NetworkConfig
-from resdepth_colmap.training.train_config import Preset, TrainConfig
+from resdepth_colmap.training.config import Preset, TrainConfig
 
 
 @command(
@@ -67,9 +67,9 @@ def train(
     config = TrainConfig.of(preset, given_values(TrainConfig, values))
     given = given_values(NetworkConfig, values)
     from resdepth_colmap.cli.log import BarProgress
-    from resdepth_colmap.training.beginning import chosen_network
+    from resdepth_colmap.training.distributed import is_first_process
+    from resdepth_colmap.training.initialisation import chosen_network
     from resdepth_colmap.training.loop import train as run_training
-    from resdepth_colmap.training.ranks import is_first_process
 
     network_config = chosen_network(config, given, preset)
     path = run_training(

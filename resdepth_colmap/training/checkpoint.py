@@ -13,7 +13,7 @@ import torch
 from resdepth_colmap.errors import TrainingError
 from resdepth_colmap.io.files import write_whole
 from resdepth_colmap.network.weights import save_weights
-from resdepth_colmap.training.optimisation import Optimisation
+from resdepth_colmap.training.optimizer import Optimisation
 
 STATE_NAME = "state.pt"
 WEIGHTS_NAME = "weights.safetensors"

@@ -8,7 +8,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from resdepth_colmap.scene import ColorImage
-from resdepth_colmap.training.training_log import Row
+from resdepth_colmap.training.log import Row
 
 _PANELS = {
     "loss": {"loss": "training", "held_out_loss": "held out"},

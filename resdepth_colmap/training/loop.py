@@ -14,7 +14,6 @@ from resdepth_colmap.errors import TrainingError
 from resdepth_colmap.io.images import write_png
 from resdepth_colmap.network.network_config import NetworkConfig
 from resdepth_colmap.progress import Advance, Progress, SilentProgress
-from resdepth_colmap.training.beginning import fresh_network
 from resdepth_colmap.training.checkpoint import (
     BEST_NAME,
     STATE_NAME,
@@ -23,14 +22,15 @@ from resdepth_colmap.training.checkpoint import (
     save_best,
     save_state,
 )
-from resdepth_colmap.training.crops import Batch
+from resdepth_colmap.training.config import TrainConfig
 from resdepth_colmap.training.curves import draw_curves
-from resdepth_colmap.training.optimisation import Optimisation
-from resdepth_colmap.training.ranks import join_ranks
-from resdepth_colmap.training.sets import Data, Places, prepare_data
+from resdepth_colmap.training.data.crops import Batch
+from resdepth_colmap.training.data.sets import Data, Places, prepare_data
+from resdepth_colmap.training.distributed import join_ranks
+from resdepth_colmap.training.initialisation import fresh_network
+from resdepth_colmap.training.log import Row, TrainingLog
+from resdepth_colmap.training.optimizer import Optimisation
 from resdepth_colmap.training.stop_request import StopRequest, stop_request
-from resdepth_colmap.training.train_config import TrainConfig
-from resdepth_colmap.training.training_log import Row, TrainingLog
 from resdepth_colmap.training.validation import mean_loss
 from resdepth_colmap.viz.strips import BeforeAfter, depth_strip
 

@@ -14,10 +14,10 @@ from resdepth_colmap.io.images import read_rgb
 from resdepth_colmap.network.unet import ResDepthNet
 from resdepth_colmap.pipeline.refine.view import refine_view
 from resdepth_colmap.scene import DepthMap
-from resdepth_colmap.training.crops import CropSampler
-from resdepth_colmap.training.labelled_views import LabelledView, labelled_views
+from resdepth_colmap.training.config import TrainConfig
+from resdepth_colmap.training.data.crops import CropSampler
+from resdepth_colmap.training.data.labelled_views import LabelledView, labelled_views
 from resdepth_colmap.training.loss import refinement_loss
-from resdepth_colmap.training.train_config import TrainConfig
 from resdepth_colmap.viz.strips import BeforeAfter
 
 NUM_BATCHES = 8

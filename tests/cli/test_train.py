@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 from resdepth_colmap.cli.main import main
 from resdepth_colmap.network.network_config import NetworkConfig
-from resdepth_colmap.training.train_config import Preset, TrainConfig
+from resdepth_colmap.training.config import Preset, TrainConfig
 
 
 class Call(NamedTuple):

@@ -13,10 +13,10 @@ from noisy_planes import write_noisy_plane
 from resdepth_colmap.errors import TrainingError
 from resdepth_colmap.network.network_config import NetworkConfig
 from resdepth_colmap.network.weights import load_weights, read_facts
+from resdepth_colmap.training.config import Preset, Schedule, TrainConfig
+from resdepth_colmap.training.data.samples import prepare_samples
 from resdepth_colmap.training.loop import train
-from resdepth_colmap.training.samples import prepare_samples
 from resdepth_colmap.training.stop_request import stop_request
-from resdepth_colmap.training.train_config import Preset, Schedule, TrainConfig
 
 NETWORK = NetworkConfig(levels=3, base_channels=4, max_channels=8)
 TRAINING = TrainConfig(

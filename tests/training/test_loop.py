@@ -13,11 +13,11 @@ from resdepth_colmap.errors import TrainingError, WorkspaceError
 from resdepth_colmap.io.colmap.depth_map import read_depth_map
 from resdepth_colmap.network.network_config import NetworkConfig
 from resdepth_colmap.network.weights import load_weights, save_weights
-from resdepth_colmap.training.beginning import fresh_network
-from resdepth_colmap.training.crops import CropSampler
+from resdepth_colmap.training.config import Precision, TrainConfig
+from resdepth_colmap.training.data.crops import CropSampler
+from resdepth_colmap.training.data.samples import prepare_samples
+from resdepth_colmap.training.initialisation import fresh_network
 from resdepth_colmap.training.loop import train
-from resdepth_colmap.training.samples import prepare_samples
-from resdepth_colmap.training.train_config import Precision, TrainConfig
 
 NETWORK = NetworkConfig(levels=3, base_channels=4, max_channels=8)
 TRAINING = TrainConfig(

@@ -9,9 +9,9 @@ from torch import Tensor
 from resdepth_colmap.network.unet import Refinement
 from resdepth_colmap.pipeline.refine.network_inputs import Scaling
 from resdepth_colmap.pipeline.refine.source_sampler import SecondLook
-from resdepth_colmap.training.crops import Batch
+from resdepth_colmap.training.config import Preset, TrainConfig
+from resdepth_colmap.training.data.crops import Batch
 from resdepth_colmap.training.loss import refinement_loss
-from resdepth_colmap.training.train_config import Preset, TrainConfig
 
 SHAPE = (2, 1, 6, 8)
 DEFAULT, PAPER = TrainConfig(), TrainConfig.of(Preset.PAPER)

@@ -13,9 +13,9 @@ from resdepth_colmap.errors import TrainingError
 from resdepth_colmap.network.network_config import NetworkConfig
 from resdepth_colmap.network.unet import ResDepthNet
 from resdepth_colmap.network.weights import load_weights, read_facts, save_weights
+from resdepth_colmap.training.config import Schedule, TrainConfig
+from resdepth_colmap.training.data.scenes import split_scenes
 from resdepth_colmap.training.loop import train
-from resdepth_colmap.training.scenes import split_scenes
-from resdepth_colmap.training.train_config import Schedule, TrainConfig
 from resdepth_colmap.training.validation import Scores, ValidationSet
 
 NETWORK = NetworkConfig(

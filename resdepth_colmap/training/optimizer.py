@@ -9,16 +9,16 @@ from torch.nn.parallel import DistributedDataParallel
 
 from resdepth_colmap.errors import TrainingError
 from resdepth_colmap.network.unet import Look, Refinement, ResDepthNet
-from resdepth_colmap.training.crops import Batch
-from resdepth_colmap.training.loss import refinement_loss
-from resdepth_colmap.training.ranks import Ranks
-from resdepth_colmap.training.synced_norm import sync_norms
-from resdepth_colmap.training.train_config import (
+from resdepth_colmap.training.config import (
     Optimiser,
     Precision,
     Schedule,
     TrainConfig,
 )
+from resdepth_colmap.training.data.crops import Batch
+from resdepth_colmap.training.distributed import Ranks
+from resdepth_colmap.training.loss import refinement_loss
+from resdepth_colmap.training.synced_norm import sync_norms
 
 WARM_UP_SHARE = 0.05
 

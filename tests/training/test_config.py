@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from resdepth_colmap.errors import ConfigError
-from resdepth_colmap.training.train_config import (
+from resdepth_colmap.training.config import (
     Optimiser,
     Preset,
     Schedule,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from resdepth_colmap.training.curves import draw_curves
-from resdepth_colmap.training.training_log import COLUMNS, TrainingLog
+from resdepth_colmap.training.log import COLUMNS, TrainingLog
 
 
 def row(step: int, **values: float) -> dict[str, float]:

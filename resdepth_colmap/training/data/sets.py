@@ -8,18 +8,18 @@ from typing import NamedTuple
 from resdepth_colmap.errors import TrainingError
 from resdepth_colmap.network.network_config import NetworkConfig
 from resdepth_colmap.progress import Progress
-from resdepth_colmap.training.beginning import init_path
-from resdepth_colmap.training.crops import CropSampler
-from resdepth_colmap.training.later_rounds import prepare_later_rounds
-from resdepth_colmap.training.ranks import Ranks
-from resdepth_colmap.training.samples import prepare_samples
-from resdepth_colmap.training.scenes import (
+from resdepth_colmap.training.config import TrainConfig
+from resdepth_colmap.training.data.crops import CropSampler
+from resdepth_colmap.training.data.outer_iterations import prepare_later_rounds
+from resdepth_colmap.training.data.samples import prepare_samples
+from resdepth_colmap.training.data.scenes import (
     Split,
     check_apart,
     find_scenes,
     split_scenes,
 )
-from resdepth_colmap.training.train_config import TrainConfig
+from resdepth_colmap.training.distributed import Ranks
+from resdepth_colmap.training.initialisation import init_path
 from resdepth_colmap.training.validation import ValidationSet
 
 CACHE_FOLDER = "samples"

@@ -13,9 +13,9 @@ from noisy_planes import write_noisy_plane
 from resdepth_colmap.errors import TrainingError
 from resdepth_colmap.network.network_config import InputVariant, NetworkConfig
 from resdepth_colmap.pipeline.refine.photometric_error import photo_consistency
-from resdepth_colmap.training import crops
-from resdepth_colmap.training.crops import CropSampler
-from resdepth_colmap.training.samples import prepare_samples, read_sample
+from resdepth_colmap.training.data import crops
+from resdepth_colmap.training.data.crops import CropSampler
+from resdepth_colmap.training.data.samples import prepare_samples, read_sample
 
 NETWORK = NetworkConfig(levels=3, base_channels=4, max_channels=8, color=True)
 

@@ -10,7 +10,7 @@ from resdepth_colmap.errors import ConfigError
 from resdepth_colmap.network.network_config import InputVariant, NetworkConfig
 from resdepth_colmap.network.unet import ResDepthNet
 from resdepth_colmap.network.weights import default_weights_path, load_weights
-from resdepth_colmap.training.train_config import Preset, TrainConfig
+from resdepth_colmap.training.config import Preset, TrainConfig
 from resdepth_colmap.training.widening import widened
 
 SHIPPED = Path("shipped")

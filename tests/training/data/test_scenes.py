@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from planes import write_plane_workspace
 
 from resdepth_colmap.errors import TrainingError, WorkspaceError
-from resdepth_colmap.training.scenes import (
+from resdepth_colmap.training.data.scenes import (
     check_apart,
     find_scenes,
     scene_name,

@@ -12,9 +12,9 @@ from workspaces import identity_weights
 
 from resdepth_colmap.network.network_config import CARRIED_CHANGE, NetworkConfig
 from resdepth_colmap.network.weights import save_weights
-from resdepth_colmap.training.crops import CropSampler
-from resdepth_colmap.training.later_rounds import prepare_later_rounds
-from resdepth_colmap.training.samples import (
+from resdepth_colmap.training.data.crops import CropSampler
+from resdepth_colmap.training.data.outer_iterations import prepare_later_rounds
+from resdepth_colmap.training.data.samples import (
     AGAIN,
     COMPLETED,
     guidance_names,

@@ -13,9 +13,9 @@ from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.geometry.resize import nearest_depth
 from resdepth_colmap.io.colmap.depth_map import read_depth_map, write_depth_map
 from resdepth_colmap.network.network_config import InputVariant, NetworkConfig
-from resdepth_colmap.training import labelled_views as labelled_views_module
-from resdepth_colmap.training.labelled_views import labelled_views
-from resdepth_colmap.training.samples import (
+from resdepth_colmap.training.data import labelled_views as labelled_views_module
+from resdepth_colmap.training.data.labelled_views import labelled_views
+from resdepth_colmap.training.data.samples import (
     COMPLETED,
     DENSE,
     HOLES,

@@ -26,7 +26,7 @@ from resdepth_colmap.pipeline.refine.source_sampler import (
     Sight,
     SourceTensors,
 )
-from resdepth_colmap.training.samples import (
+from resdepth_colmap.training.data.samples import (
     AGAIN,
     COMPLETED,
     DENSE,

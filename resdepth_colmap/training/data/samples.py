@@ -25,7 +25,11 @@ from resdepth_colmap.pipeline.refine.network_inputs import build_inputs
 from resdepth_colmap.pipeline.refine.view import ViewInputs, view_tensors
 from resdepth_colmap.progress import Progress, SilentProgress
 from resdepth_colmap.scene import DepthMap
-from resdepth_colmap.training.labelled_views import LabelledView, Loaded, labelled_views
+from resdepth_colmap.training.data.labelled_views import (
+    LabelledView,
+    Loaded,
+    labelled_views,
+)
 
 HOLES_CONSISTENCY = 0.25
 """Photo-consistency above which the copy "with holes" of a map has none."""

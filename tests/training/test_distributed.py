@@ -17,8 +17,8 @@ from resdepth_colmap.errors import ConfigError
 from resdepth_colmap.network.network_config import NetworkConfig
 from resdepth_colmap.network.unet import ResDepthNet
 from resdepth_colmap.network.weights import load_weights, save_weights
-from resdepth_colmap.training.ranks import Ranks, join_ranks
-from resdepth_colmap.training.samples import prepare_samples
+from resdepth_colmap.training.data.samples import prepare_samples
+from resdepth_colmap.training.distributed import Ranks, join_ranks
 
 NETWORK = NetworkConfig(levels=2, base_channels=4, max_channels=8)
 TIMEOUT_S = 400

@@ -10,8 +10,12 @@ from resdepth_colmap.errors import ConfigError
 from resdepth_colmap.network.network_config import NetworkConfig
 from resdepth_colmap.network.unet import ResDepthNet
 from resdepth_colmap.network.weights import load_weights, save_weights
-from resdepth_colmap.training.beginning import SHIPPED, chosen_network, fresh_network
-from resdepth_colmap.training.train_config import TrainConfig
+from resdepth_colmap.training.config import TrainConfig
+from resdepth_colmap.training.initialisation import (
+    SHIPPED,
+    chosen_network,
+    fresh_network,
+)
 
 NETWORK = NetworkConfig(levels=2, base_channels=4, max_channels=8)
 

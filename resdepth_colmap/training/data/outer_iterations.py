@@ -13,8 +13,12 @@ from resdepth_colmap.network.weights import load_weights, weights_hash
 from resdepth_colmap.pipeline.refine.view import ViewInputs, refine_view
 from resdepth_colmap.progress import Progress, SilentProgress
 from resdepth_colmap.scene import DepthMap
-from resdepth_colmap.training.labelled_views import LabelledView, Loaded, labelled_views
-from resdepth_colmap.training.samples import (
+from resdepth_colmap.training.data.labelled_views import (
+    LabelledView,
+    Loaded,
+    labelled_views,
+)
+from resdepth_colmap.training.data.samples import (
     AGAIN,
     build_sample,
     is_whole,

@@ -30,7 +30,7 @@ from resdepth_colmap.pipeline.stereo.stage import stereo_workspace
 from resdepth_colmap.pipeline.view_images import ViewImages
 from resdepth_colmap.progress import Progress, SilentProgress
 from resdepth_colmap.scene import DepthMap, Scene
-from resdepth_colmap.training.scenes import scene_name
+from resdepth_colmap.training.data.scenes import scene_name
 
 logger = logging.getLogger(__name__)
 
