@@ -21,8 +21,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from resdepth_colmap.evaluation.cloud_config import CloudConfig
-from resdepth_colmap.evaluation.cloud_files import score_cloud_file
+from resdepth_colmap.evaluation.cloud.config import CloudConfig
+from resdepth_colmap.evaluation.cloud.files import score_cloud_file
 from resdepth_colmap.evaluation.cloud_tables import SCORES, cloud_table
 from resdepth_colmap.io.point_cloud import PointCloud, write_cloud
 from resdepth_colmap.versions import peak_memory_mb, versions

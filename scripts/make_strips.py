@@ -14,7 +14,7 @@ import os
 from pathlib import Path
 
 from resdepth_colmap.config import RefineConfig
-from resdepth_colmap.evaluation.match_cache import MatchCache
+from resdepth_colmap.evaluation.depth.match_cache import MatchCache
 from resdepth_colmap.evaluation.scene_strips import scene_strips, scenes_at
 
 REPOSITORY = Path(__file__).resolve().parents[1]

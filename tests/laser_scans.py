@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
-from resdepth_colmap.evaluation.cloud_scores import PlacedScan
+from resdepth_colmap.evaluation.cloud.scores import PlacedScan
 
 Points = npt.NDArray[np.float32]
 

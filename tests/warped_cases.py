@@ -3,7 +3,7 @@
 import numpy as np
 import torch
 
-from resdepth_colmap.evaluation.depth_case import DepthCase, source_from_reference
+from resdepth_colmap.evaluation.datasets.sample import DepthCase, source_from_reference
 from resdepth_colmap.geometry.warp import warp_to_reference
 
 

@@ -9,10 +9,10 @@ import click
 from resdepth_colmap.cli.command_line import command_line
 from resdepth_colmap.cli.options import build_config, command, config_options
 from resdepth_colmap.config import FuseConfig
-from resdepth_colmap.evaluation.compare_config import FUSE_OPTIONS, CompareConfig
+from resdepth_colmap.evaluation.compare.config import FUSE_OPTIONS, CompareConfig
 
 if TYPE_CHECKING:
-    from resdepth_colmap.evaluation.comparison import CloudTruth
+    from resdepth_colmap.evaluation.compare.comparison import CloudTruth
 
 _UNSAID = ("as_json", "output")  # they change no figure
 
@@ -87,7 +87,7 @@ def compare(
     config = build_config(CompareConfig, {**values, "fuse": fuse})
     from resdepth_colmap.cli.log import BarProgress
     from resdepth_colmap.cli.printed_comparison import show_workspace
-    from resdepth_colmap.evaluation.comparisons import compare_workspaces
+    from resdepth_colmap.evaluation.compare.comparisons import compare_workspaces
     from resdepth_colmap.io.files import write_whole
 
     report = compare_workspaces(
@@ -118,8 +118,8 @@ def compare(
 def _truth(path: Path | None, config: CompareConfig) -> "CloudTruth | None":
     if path is None:
         return None
-    from resdepth_colmap.evaluation.cloud_config import CloudConfig
-    from resdepth_colmap.evaluation.laser_truth import read_laser_truth
+    from resdepth_colmap.evaluation.cloud.config import CloudConfig
+    from resdepth_colmap.evaluation.cloud.laser_truth import read_laser_truth
 
     tolerances = config.tolerances or CloudConfig.tolerances
     return read_laser_truth(path, CloudConfig(tolerances=tolerances))

@@ -32,7 +32,7 @@ def demo(output: Path, **values: Any) -> None:
     config = build_config(SynthesisConfig, values)
     from resdepth_colmap.cli.log import BarProgress
     from resdepth_colmap.cli.printed import show_comparison, show_run
-    from resdepth_colmap.evaluation.truth import compare_with_truth
+    from resdepth_colmap.evaluation.depth.truth import compare_with_truth
     from resdepth_colmap.report.refine_and_report import refine_and_report
     from resdepth_colmap.synthetic.synthesize import synthesize
 

@@ -10,11 +10,11 @@ import click
 from resdepth_colmap.cli.command_line import command_line
 from resdepth_colmap.cli.options import Command, build_config
 from resdepth_colmap.config import RefineConfig, StereoBackend, StereoConfig
-from resdepth_colmap.evaluation.paper import PAPER_MAX_RESIDUAL
+from resdepth_colmap.evaluation.datasets.paper import PAPER_MAX_RESIDUAL
 
 if TYPE_CHECKING:
-    from resdepth_colmap.evaluation.depth_case import SceneSource
-    from resdepth_colmap.evaluation.depth_evaluation import EvaluationOptions
+    from resdepth_colmap.evaluation.datasets.sample import SceneSource
+    from resdepth_colmap.evaluation.depth.evaluation import EvaluationOptions
     from resdepth_colmap.evaluation.tables import Measured
 
 NO_MATCHER_OPTIONS = (
@@ -63,8 +63,8 @@ def evaluation_options(
     """The options of a comparison, from a command's values."""
     refine = build_config(RefineConfig, values)
     stereo = build_config(StereoConfig, values)
-    from resdepth_colmap.evaluation.depth_evaluation import EvaluationOptions
-    from resdepth_colmap.evaluation.match_cache import MatchCache
+    from resdepth_colmap.evaluation.depth.evaluation import EvaluationOptions
+    from resdepth_colmap.evaluation.depth.match_cache import MatchCache
 
     return EvaluationOptions(
         refine=refine,
@@ -92,7 +92,7 @@ def run_evaluation(
         protocol: What else the result has to say of itself.
     """
     from resdepth_colmap.cli.log import BarProgress
-    from resdepth_colmap.evaluation.depth_evaluation import Listener, evaluate_scenes
+    from resdepth_colmap.evaluation.depth.evaluation import Listener, evaluate_scenes
     from resdepth_colmap.io.files import write_whole
 
     listener = Listener(on_failure=_say_failure, progress=BarProgress())

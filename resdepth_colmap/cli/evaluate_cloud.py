@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from resdepth_colmap.cli.options import build_config, command, config_options
-from resdepth_colmap.evaluation.cloud_config import DEFAULT_TOLERANCES, CloudConfig
+from resdepth_colmap.evaluation.cloud.config import DEFAULT_TOLERANCES, CloudConfig
 
 if TYPE_CHECKING:
-    from resdepth_colmap.evaluation.cloud_scores import CloudScores
+    from resdepth_colmap.evaluation.cloud.scores import CloudScores
 
 
 def _tolerances(_context: click.Context, _option: object, text: str) -> Any:
@@ -63,7 +63,7 @@ def cloud(
     """
     config = build_config(CloudConfig, values)
     from resdepth_colmap.cli.log import BarProgress
-    from resdepth_colmap.evaluation.cloud_files import score_cloud_file
+    from resdepth_colmap.evaluation.cloud.files import score_cloud_file
     from resdepth_colmap.io.files import write_whole
 
     scores = score_cloud_file(reconstruction, ground_truth, config, BarProgress())

@@ -47,8 +47,8 @@ def depth(scenes: tuple[Path, ...], cache: Path | None, **values: Any) -> None:
     changed. A broken SCENE does not stop the others; the exit code is 1 then.
     """
     options = evaluation_options(values, StereoBackend.CPU, cache)
-    from resdepth_colmap.evaluation.depth_scenes import scene_sources
-    from resdepth_colmap.evaluation.depth_tables import depth_table
+    from resdepth_colmap.evaluation.datasets.scenes import scene_sources
+    from resdepth_colmap.evaluation.depth.tables import depth_table
 
     sources = scene_sources(scenes)
     run_evaluation(sources, options, depth_table, values)

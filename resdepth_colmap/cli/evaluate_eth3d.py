@@ -14,7 +14,7 @@ from resdepth_colmap.cli.depth_comparison import (
 )
 from resdepth_colmap.cli.options import command, config_options, enum_option
 from resdepth_colmap.config import RefineConfig, StereoBackend, StereoConfig
-from resdepth_colmap.evaluation.paper import PAPER_IMAGE_WIDTH_PX
+from resdepth_colmap.evaluation.datasets.paper import PAPER_IMAGE_WIDTH_PX
 
 CACHE_NAME = "resdepth-cache"
 
@@ -83,8 +83,8 @@ def eth3d(
     scene does not stop the others; the exit code is 1 then.
     """
     options = evaluation_options(values, backend, cache or root / CACHE_NAME)
-    from resdepth_colmap.evaluation.eth3d_cases import Eth3dOptions, eth3d_sources
-    from resdepth_colmap.evaluation.eth3d_tables import eth3d_table
+    from resdepth_colmap.evaluation.datasets.eth3d import Eth3dOptions, eth3d_sources
+    from resdepth_colmap.evaluation.depth.eth3d_tables import eth3d_table
 
     names = ("scenes", "pairs_path", "num_pairs", "image_width_px")
     chosen = Eth3dOptions(**{name: values[name] for name in names})

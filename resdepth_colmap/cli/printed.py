@@ -9,8 +9,8 @@ if TYPE_CHECKING:
 
     from rich.table import Table
 
-    from resdepth_colmap.evaluation.depth_metrics import DepthMetrics
-    from resdepth_colmap.evaluation.truth import Comparison
+    from resdepth_colmap.evaluation.depth.truth import Comparison
+    from resdepth_colmap.evaluation.metrics.depth_metrics import DepthMetrics
     from resdepth_colmap.pipeline.info import Inspection
     from resdepth_colmap.pipeline.run import RunResult
 

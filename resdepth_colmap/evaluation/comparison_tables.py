@@ -11,7 +11,7 @@ from resdepth_colmap.evaluation.markdown import (
     number,
     percent,
 )
-from resdepth_colmap.evaluation.measures import MEASURES
+from resdepth_colmap.evaluation.metrics.measures import MEASURES
 
 Measured = Mapping[str, Any]
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from resdepth_colmap.errors import BackendUnavailableError, WorkspaceError
-from resdepth_colmap.evaluation.paper import PAPER_ROWS
+from resdepth_colmap.evaluation.datasets.paper import PAPER_ROWS
 from resdepth_colmap.io.colmap.output import read_record, write_record
 from resdepth_colmap.io.download import OnBytes, download, file_hash
 from resdepth_colmap.io.files import safe_name

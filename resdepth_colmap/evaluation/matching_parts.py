@@ -10,7 +10,8 @@ import numpy as np
 
 from resdepth_colmap.config import FuseConfig, StereoConfig
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.evaluation.depth_metrics import depth_metrics
+from resdepth_colmap.evaluation.cloud.reference_cloud import read_depth_truth
+from resdepth_colmap.evaluation.datasets.workspaces import SEEN_SUFFIX, TRUTH_FOLDER
 from resdepth_colmap.evaluation.map_agreement import mean_of, shares_within
 from resdepth_colmap.evaluation.matched_workspace import (
     MatchedWorkspace,
@@ -28,8 +29,7 @@ from resdepth_colmap.evaluation.matching_passes import (
     match_both,
 )
 from resdepth_colmap.evaluation.matching_speed import measured_speed
-from resdepth_colmap.evaluation.true_cloud import read_depth_truth
-from resdepth_colmap.evaluation.workspace_cases import SEEN_SUFFIX, TRUTH_FOLDER
+from resdepth_colmap.evaluation.metrics.depth_metrics import depth_metrics
 from resdepth_colmap.io.colmap.cfg import SourceKind, SourceSpec
 from resdepth_colmap.io.colmap.depth_map import read_depth_map
 from resdepth_colmap.io.colmap.workspace import open_workspace

@@ -10,17 +10,17 @@ import numpy as np
 
 from resdepth_colmap.config import RefineConfig, StereoBackend, StereoConfig
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.evaluation.case_matching import initial_depth
-from resdepth_colmap.evaluation.depth_case import CaseOptions
-from resdepth_colmap.evaluation.match_cache import MatchCache
+from resdepth_colmap.evaluation.datasets.sample import CaseOptions
+from resdepth_colmap.evaluation.datasets.workspaces import (
+    TRUTH_FOLDER,
+    read_workspace_cases,
+)
+from resdepth_colmap.evaluation.depth.match_cache import MatchCache
+from resdepth_colmap.evaluation.depth.sample_matching import initial_depth
 from resdepth_colmap.evaluation.matched_workspace import (
     MatchedWorkspace,
     linked_maps,
     matched_workspace,
-)
-from resdepth_colmap.evaluation.workspace_cases import (
-    TRUTH_FOLDER,
-    read_workspace_cases,
 )
 from resdepth_colmap.io.colmap.depth_map import write_depth_map
 from resdepth_colmap.io.colmap.workspace import open_workspace

@@ -3,7 +3,10 @@
 from collections.abc import Mapping
 from typing import Any
 
-from resdepth_colmap.evaluation.depth_metrics import depth_metrics, median_filtered
+from resdepth_colmap.evaluation.metrics.depth_metrics import (
+    depth_metrics,
+    median_filtered,
+)
 from resdepth_colmap.scene import DepthMap
 
 MEASURES = ("mae", "rmse", "medae", "bad_2")

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from resdepth_colmap.evaluation.depth_metrics import depth_metrics
+from resdepth_colmap.evaluation.metrics.depth_metrics import depth_metrics
 from resdepth_colmap.report.image_maps import ImageMaps
 from resdepth_colmap.viz.colormaps import (
     DepthScale,

@@ -10,7 +10,7 @@ from stereo_pairs import write_as_distributed, write_stereo_pair
 from workspaces import identity_weights
 
 from resdepth_colmap.cli.main import main
-from resdepth_colmap.evaluation.paper import PAPER_MAX_RESIDUAL
+from resdepth_colmap.evaluation.datasets.paper import PAPER_MAX_RESIDUAL
 from resdepth_colmap.evaluation.tables import middlebury_table
 
 FAST = ("--num-iterations", "2", "--window-radius", "3")

@@ -16,10 +16,10 @@ from workspaces import identity_weights
 
 from resdepth_colmap.cli.main import main
 from resdepth_colmap.config import StereoBackend, StereoConfig
-from resdepth_colmap.evaluation.case_matching import cache_name
-from resdepth_colmap.evaluation.depth_case import CaseOptions
-from resdepth_colmap.evaluation.eth3d_cases import Eth3dOptions, eth3d_sources
-from resdepth_colmap.evaluation.match_cache import MatchCache, Matching
+from resdepth_colmap.evaluation.datasets.eth3d import Eth3dOptions, eth3d_sources
+from resdepth_colmap.evaluation.datasets.sample import CaseOptions
+from resdepth_colmap.evaluation.depth.match_cache import MatchCache, Matching
+from resdepth_colmap.evaluation.depth.sample_matching import cache_name
 
 WIDTH_PX = 120
 FAST = ("--num-iterations", "3", "--window-radius", "3")
@@ -114,7 +114,7 @@ def test_a_run_goes_on_from_its_cache(
     root = copied(rendered, tmp_path / "ETH3D" / "office").parent
     first = measured(evaluate(tmp_path, root, "--json", "--num-pairs", 1))
     assert len(list((root / "resdepth-cache").iterdir())) == 1
-    monkeypatch.delattr("resdepth_colmap.evaluation.case_matching.match_view")
+    monkeypatch.delattr("resdepth_colmap.evaluation.depth.sample_matching.match_view")
     again = measured(evaluate(tmp_path, root, "--json", "--num-pairs", 1))
     assert (
         again["scenes"]["office"]["unfiltered"]

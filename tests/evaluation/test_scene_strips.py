@@ -11,8 +11,8 @@ from workspaces import identity_weights
 
 from resdepth_colmap.config import RefineConfig
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.evaluation import case_matching
-from resdepth_colmap.evaluation.match_cache import MatchCache
+from resdepth_colmap.evaluation.depth import sample_matching as case_matching
+from resdepth_colmap.evaluation.depth.match_cache import MatchCache
 from resdepth_colmap.evaluation.scene_strips import scene_strips, scenes_at
 from resdepth_colmap.io.colmap.depth_map import read_depth_map
 from resdepth_colmap.io.images import read_rgb

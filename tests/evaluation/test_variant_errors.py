@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from resdepth_colmap.evaluation.depth_metrics import depth_metrics
+from resdepth_colmap.evaluation.metrics.depth_metrics import depth_metrics
 from resdepth_colmap.evaluation.variant_errors import arm_errors, arm_summaries
 
 TRUTH = np.full((12, 10), 2.0, np.float32)

@@ -1,0 +1,1 @@
+"""Point clouds against laser scans and reference clouds."""

@@ -1,0 +1,178 @@
+"""Accuracy, completeness and F1 of a cloud against laser scans, by ETH3D's rules.
+
+T. Schöps et al., A Multi-View Stereo Benchmark with High-Resolution Images and
+Multi-Camera Videos, CVPR 2017; as their evaluation program does it, which is where the
+rules are written down: https://github.com/ETH3D/multi-view-evaluation.
+"""
+
+import dataclasses
+import logging
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from resdepth_colmap.evaluation.cloud.alignment import warn_of_misfit
+from resdepth_colmap.evaluation.cloud.beams import judge
+from resdepth_colmap.evaluation.cloud.completeness import completeness_levels
+from resdepth_colmap.evaluation.cloud.config import CloudConfig
+from resdepth_colmap.evaluation.cloud.laser_scan import sort_scan
+from resdepth_colmap.evaluation.cloud.voxel_mean import VoxelGrids
+from resdepth_colmap.progress import Progress, SilentProgress
+
+logger = logging.getLogger(__name__)
+
+_POINTS_AT_ONCE = 1 << 17
+_FAR_M = 1e15  # its square is a number in float32
+
+Points = npt.NDArray[np.float32]
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
+class PlacedScan:
+    """A laser scan, and where its scanner stood.
+
+    Attributes:
+        points: Coordinates in the frame of the scanner, in metres, shape (N, 3).
+        world_from_scan: Rigid motion, shape (4, 4).
+    """
+
+    points: Points
+    world_from_scan: Points
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class CloudScores:
+    """Scores of a cloud; each has one value a tolerance, in 0..1.
+
+    Attributes:
+        tolerances: Distances, in metres.
+        accuracy: Share of the cloud's observed points that are right.
+        completeness: Share of the scans' points that the cloud reaches.
+        f1: Harmonic mean of both.
+        num_points: Points of the cloud that were compared.
+        num_scan_points: Points of all scans together.
+    """
+
+    tolerances: tuple[float, ...]
+    accuracy: tuple[float, ...]
+    completeness: tuple[float, ...]
+    f1: tuple[float, ...]
+    num_points: int
+    num_scan_points: int
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Plain values only, ready for JSON."""
+        return dataclasses.asdict(self)
+
+
+def cloud_scores(
+    points: Points,
+    scans: Sequence[PlacedScan],
+    config: CloudConfig,
+    progress: Progress | None = None,
+) -> CloudScores:
+    """Compare a cloud with laser scans.
+
+    Args:
+        points: Coordinates of the cloud in the world of the scans, in metres, shape
+            (N, 3). Points that are not finite are left out, as in the scans. Without
+            any point all scores are 0.
+        scans: At least one scan with a point.
+        config: Tolerances, voxels and beam.
+        progress: Is told how far the comparison is.
+
+    Raises:
+        ValueError: If the scans have no point.
+    """
+    progress = progress or SilentProgress()
+    points = _finite(points, "the cloud")
+    local = [_finite(s.points, f"scan {i}") for i, s in enumerate(scans, start=1)]
+    poses = [scan.world_from_scan.astype(np.float32) for scan in scans]
+    world = np.concatenate([_moved(p, T) for p, T in zip(local, poses, strict=True)])
+    if len(world) == 0:
+        raise ValueError("the scans have no point.")
+    warn_of_misfit(points, world)
+    completeness = _completeness(points, world, config, progress)
+    num_scan_points = len(world)
+    del world
+    accuracy = _accuracy(points, list(zip(local, poses, strict=True)), config, progress)
+    return CloudScores(
+        tolerances=config.tolerances,
+        accuracy=accuracy,
+        completeness=completeness,
+        f1=tuple(map(f1_score, accuracy, completeness)),
+        num_points=len(points),
+        num_scan_points=num_scan_points,
+    )
+
+
+def _completeness(
+    points: Points, world: Points, config: CloudConfig, progress: Progress
+) -> tuple[float, ...]:
+    with progress.stage("Completeness", len(world)) as advance:
+        levels = completeness_levels(world, points, config.tolerances, advance)
+    grids = VoxelGrids(world, config.voxel_size)
+    counted = np.ones(len(world), bool)
+    return tuple(
+        grids.mean_share(levels <= index, counted)
+        for index in range(len(config.tolerances))
+    )
+
+
+def _accuracy(
+    points: Points,
+    scans: Sequence[tuple[Points, Points]],
+    config: CloudConfig,
+    progress: Progress,
+) -> tuple[float, ...]:
+    squared_distance = np.full(len(points), np.inf, np.float32)
+    is_in_front = np.zeros(len(points), bool)
+    with progress.stage("Accuracy", len(points) * len(scans)) as advance:
+        for scan_points, world_from_scan in scans:
+            scan = sort_scan(scan_points)
+            for start in range(0, len(points), _POINTS_AT_ONCE):
+                part = slice(start, start + _POINTS_AT_ONCE)
+                local = _moved(points[part], _inverse(world_from_scan))
+                squared, in_front = judge(local, scan, config)
+                squared_distance[part] = np.minimum(squared_distance[part], squared)
+                is_in_front[part] |= in_front
+                advance(len(local))
+    grids = VoxelGrids(points, config.voxel_size)
+    squared_tolerances = np.array(config.tolerances, np.float32) ** 2
+    accurate = [squared_distance <= squared for squared in squared_tolerances]
+    return tuple(grids.mean_share(good, good | is_in_front) for good in accurate)
+
+
+def _moved(points: Points, motion: Points) -> Points:
+    """Apply a rigid motion.
+
+    In float32, and summed in the order of the official program (by PCL): walls often
+    lie just on a voxel's border, where the last bit decides.
+    """
+    x, y, z = points.T
+    rows = [r[0] * x + (r[1] * y + (r[2] * z + r[3])) for r in motion[:3]]
+    return np.stack(rows, axis=1)
+
+
+def _inverse(motion: Points) -> Points:
+    inverse = np.eye(4, dtype=np.float32)
+    inverse[:3, :3] = motion[:3, :3].T
+    inverse[:3, 3] = motion[:3, :3].T @ -motion[:3, 3]
+    return inverse
+
+
+def f1_score(accuracy: float, completeness: float) -> float:
+    """Harmonic mean of both, in 0..1; 0 if both are 0."""
+    total = accuracy + completeness
+    return 2 * accuracy * completeness / total if total > 0 else 0.0
+
+
+def _finite(points: Points, name: str) -> Points:
+    is_finite = (np.abs(points) < _FAR_M).all(axis=1)
+    if is_finite.all():
+        return points
+    num_others = len(points) - int(is_finite.sum())
+    logger.warning("%s: %d points are not finite and left out.", name, num_others)
+    return points[is_finite]

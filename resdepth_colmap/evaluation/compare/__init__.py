@@ -1,0 +1,1 @@
+"""`compare`: filtered, unfiltered and refined maps of a workspace."""

@@ -1,0 +1,191 @@
+"""The arms of a comparison: which maps of a workspace are filtered, and which not."""
+
+import dataclasses
+import shlex
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from resdepth_colmap.errors import WorkspaceError
+from resdepth_colmap.evaluation.compare.config import CompareConfig
+from resdepth_colmap.io.colmap.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.output import OutputWorkspace
+from resdepth_colmap.io.colmap.workspace import Workspace, original_map_path
+from resdepth_colmap.pipeline.fuse.views import MapFiles
+from resdepth_colmap.pipeline.initial_map import check_map_size, map_path
+from resdepth_colmap.pipeline.refine.cross_view import FILTERED_SHARE
+from resdepth_colmap.scene import Scene, View
+
+ARMS = ("filtered", "unfiltered", "refined")
+REFINED = "refined"
+
+_PREFERRED = "geometric"  # what COLMAP calls its last maps
+_WITHOUT = {
+    "filtered": "no {kinds} map with holes: left out; `resdepth-colmap stereo` and "
+    "COLMAP's patch_match_stereo write filtered geometric maps",
+    "unfiltered": "no {kinds} map without holes: left out; `resdepth-colmap stereo` "
+    "and COLMAP's patch_match_stereo leave unfiltered photometric maps",
+}
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
+class Arm:
+    """The maps of one arm.
+
+    Attributes:
+        name: One of `ARMS`.
+        kind: The word before ".bin" in the names of its files, or "refined".
+        files: The maps of each compared view, in the order of the scene.
+    """
+
+    name: str
+    kind: str
+    files: tuple[MapFiles, ...]
+
+    @property
+    def own_normals(self) -> bool:
+        """Whether each view has a normal map; else they are computed from the depth."""
+        return all(
+            file.normal_path is not None and file.normal_path.is_file()
+            for file in self.files
+        )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
+class FoundArms:
+    """The arms that a workspace has.
+
+    Attributes:
+        arms: The refined maps, and filtered ones or unfiltered ones or both, of the
+            same views.
+        notes: What there is to say about what is missing.
+    """
+
+    arms: tuple[Arm, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def views(self) -> tuple[View, ...]:
+        """The views that are compared: all arms have a map of each."""
+        return tuple(file.view for file in self.arms[0].files)
+
+
+def find_arms(
+    output: OutputWorkspace, scene: Scene, config: CompareConfig
+) -> FoundArms:
+    """Find the arms of a workspace; the maps themselves are only looked through.
+
+    Args:
+        output: Where the refined maps of the workspace are.
+        scene: Its views.
+        config: May name the kinds.
+
+    Raises:
+        WorkspaceError: If there are no refined maps, no others, no view that has both,
+            or a map is broken.
+    """
+    workspace = output.source
+    refined = [view for view in scene.views if output.is_written(view.name)]
+    if not refined:
+        raise WorkspaceError(
+            f"{output.workspace.stereo_path}: no refined map; run `resdepth-colmap "
+            f"refine {shlex.quote(str(workspace.path))}` first."
+        )
+    kinds = {view.name: workspace.original_kinds(view.name) for view in refined}
+    if not any(kinds.values()):
+        raise WorkspaceError(
+            f"{workspace.stereo_path / 'depth_maps'}: no depth map of any refined "
+            "image, so there is nothing to compare the refined maps with; make some "
+            "with `resdepth-colmap stereo`."
+        )
+    chosen = _chosen_kinds(workspace, _filled_shares(workspace, refined, kinds), config)
+    compared = [v for v in refined if set(chosen.values()) <= set(kinds[v.name])]
+    if not compared:
+        named = " and ".join(chosen.values())
+        raise WorkspaceError(
+            f"{workspace.stereo_path / 'depth_maps'}: no image has {named} maps and a "
+            "refined one; refine more images, or choose with --filtered and "
+            "--unfiltered."
+        )
+    notes = [
+        f"{name} arm: {_WITHOUT[name].format(kinds='depth')}."
+        for name in ARMS
+        if name != REFINED and name not in chosen
+    ]
+    if len(compared) < len(scene.views):
+        notes.append(
+            f"{len(compared)} of {len(scene.views)} views are compared: only they have "
+            "a map in every arm."
+        )
+    return FoundArms(
+        arms=tuple(
+            _arm(output, compared, name, chosen.get(name, REFINED))
+            for name in ARMS
+            if name == REFINED or name in chosen
+        ),
+        notes=tuple(notes),
+    )
+
+
+def _filled_shares(
+    workspace: Workspace, views: Sequence[View], kinds: Mapping[str, Sequence[str]]
+) -> dict[str, float]:
+    """Of each kind the mean share of pixels with a depth."""
+    shares: dict[str, list[float]] = {}
+    for view in views:
+        for kind in kinds[view.name]:
+            path = map_path(workspace, view.name, kind)
+            check_map_size(path, view.camera)
+            depth = read_depth_map(path)
+            share = float(np.count_nonzero(depth) / depth.size)
+            shares.setdefault(kind, []).append(share)
+    return {kind: sum(values) / len(values) for kind, values in shares.items()}
+
+
+def _chosen_kinds(
+    workspace: Workspace, shares: Mapping[str, float], config: CompareConfig
+) -> dict[str, str]:
+    """The kind of the filtered arm and that of the unfiltered one, if there is any."""
+    chosen = {"filtered": config.filtered, "unfiltered": config.unfiltered}
+    for name, kind in chosen.items():
+        if kind and kind not in shares:
+            raise WorkspaceError(
+                f"{workspace.stereo_path / 'depth_maps'}: no {kind} map of a refined "
+                f"image, but there are: {', '.join(shares)}; choose one of these with "
+                f"--{name}."
+            )
+    free = [kind for kind in shares if kind not in chosen.values()]
+    candidates = {
+        "filtered": [kind for kind in free if shares[kind] < FILTERED_SHARE],
+        "unfiltered": [kind for kind in free if shares[kind] >= FILTERED_SHARE],
+    }
+    for name, kinds in candidates.items():
+        if kinds and not chosen[name]:
+            chosen[name] = _PREFERRED if _PREFERRED in kinds else kinds[0]
+    return {name: kind for name, kind in chosen.items() if kind}
+
+
+def _arm(output: OutputWorkspace, views: Sequence[View], name: str, kind: str) -> Arm:
+    make = _refined_file if name == REFINED else _initial_file
+    files = tuple(make(output, view, kind) for view in views)
+    return Arm(name=name, kind=kind, files=files)
+
+
+def _refined_file(output: OutputWorkspace, view: View, _kind: str) -> MapFiles:
+    return MapFiles(
+        view=view,
+        image_path=output.source.image_path(view.name),
+        depth_path=output.depth_map_path(view.name),
+        normal_path=output.normal_map_path(view.name),
+        confidence_path=output.confidence_map_path(view.name),
+    )
+
+
+def _initial_file(output: OutputWorkspace, view: View, kind: str) -> MapFiles:
+    workspace = output.source
+    return MapFiles(
+        view=view,
+        image_path=workspace.image_path(view.name),
+        depth_path=map_path(workspace, view.name, kind),
+        normal_path=original_map_path(workspace.normal_map_path(view.name, kind)),
+    )

@@ -1,0 +1,63 @@
+"""The scenes that paths name: workspaces with truth, and scenes of Middlebury."""
+
+import functools
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from resdepth_colmap.evaluation.datasets.middlebury import (
+    is_middlebury_scene,
+    read_middlebury_cases,
+)
+from resdepth_colmap.evaluation.datasets.sample import (
+    CaseOptions,
+    LazyCase,
+    SceneSource,
+)
+from resdepth_colmap.evaluation.datasets.workspaces import (
+    TRUTH_FOLDER,
+    read_workspace_cases,
+)
+
+
+def scene_sources(paths: Sequence[Path]) -> tuple[SceneSource, ...]:
+    """What is to be compared; nothing is read yet.
+
+    Args:
+        paths: Scenes, or folders of scenes.
+
+    Returns:
+        One source a scene, in the order of the paths. A path that is neither is a
+        source too: reading it says what is wrong.
+    """
+    folders = list(dict.fromkeys(f for path in paths for f in _scenes_at(path)))
+    names = distinct_names(folders)
+    return tuple(
+        SceneSource(name=name, read=functools.partial(_reader(folder), folder))
+        for name, folder in zip(names, folders, strict=True)
+    )
+
+
+def _scenes_at(path: Path) -> list[Path]:
+    if _is_scene(path) or not path.is_dir():
+        return [path]
+    return [child for child in sorted(path.iterdir()) if _is_scene(child)] or [path]
+
+
+def _is_scene(path: Path) -> bool:
+    return (path / TRUTH_FOLDER).is_dir() or is_middlebury_scene(path)
+
+
+def _reader(path: Path) -> Callable[[Path, CaseOptions], Sequence[LazyCase]]:
+    return read_middlebury_cases if is_middlebury_scene(path) else read_workspace_cases
+
+
+def distinct_names(folders: Sequence[Path]) -> list[str]:
+    """The names of the folders, with as many of their parents as tells them apart."""
+    parts = [folder.absolute().parts for folder in folders]
+    length = 1
+    while length < max(map(len, parts), default=1):
+        names = ["/".join(it[-length:]) for it in parts]
+        if len(set(names)) == len(names):
+            break
+        length += 1
+    return ["/".join(it[-length:]) for it in parts]

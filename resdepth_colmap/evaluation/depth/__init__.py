@@ -1,0 +1,1 @@
+"""`evaluate depth` and `evaluate eth3d`: depth maps against the truth."""

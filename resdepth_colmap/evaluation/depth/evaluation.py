@@ -1,0 +1,156 @@
+"""Compare depth maps with the truth, scene after scene; a broken one stops no other."""
+
+import dataclasses
+import datetime
+import logging
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from resdepth_colmap.config import RefineConfig, StereoBackend, StereoConfig
+from resdepth_colmap.errors import ResDepthError, WorkspaceError
+from resdepth_colmap.evaluation.datasets.paper import PAPER_MAX_RESIDUAL
+from resdepth_colmap.evaluation.datasets.sample import (
+    CaseOptions,
+    DepthCase,
+    SceneSource,
+)
+from resdepth_colmap.evaluation.depth.match_cache import MatchCache
+from resdepth_colmap.evaluation.depth.methods import CaseResult, measure_case
+from resdepth_colmap.evaluation.depth.result import DepthReport, SceneResult
+from resdepth_colmap.evaluation.depth.sample_matching import (
+    initial_depth,
+    matching_backend,
+)
+from resdepth_colmap.network.device import resolve_device
+from resdepth_colmap.network.inference import for_inference
+from resdepth_colmap.network.unet import ResDepthNet
+from resdepth_colmap.network.weights import load_weights, weights_hash
+from resdepth_colmap.pipeline.refine.view import SourceView, ViewInputs, refine_view
+from resdepth_colmap.progress import Progress, SilentProgress
+from resdepth_colmap.versions import versions
+
+_WARM_UP_PX = 32
+
+logger = logging.getLogger(__name__)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class EvaluationOptions:
+    """How depth maps are made and compared.
+
+    Attributes:
+        refine: Weights, passes, tiles and device.
+        stereo: Options of the matcher, where depth has to be matched.
+        backend: Who matches then: auto, COLMAP (CUDA) or our own on the CPU.
+        cache: Where matched depth is kept from one run to the next.
+        max_residual: Larger errors, in units, are discarded; None = none is.
+    """
+
+    refine: RefineConfig = dataclasses.field(default_factory=RefineConfig)
+    stereo: StereoConfig = dataclasses.field(default_factory=StereoConfig)
+    backend: StereoBackend = StereoBackend.CPU
+    cache: MatchCache | None = None
+    max_residual: float | None = PAPER_MAX_RESIDUAL
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Listener:
+    """Who is told while the comparison runs.
+
+    Attributes:
+        on_failure: Told the name of a scene that is broken, and what is wrong.
+        progress: Shows one stage of all scenes.
+    """
+
+    on_failure: Callable[[str, str], None] | None = None
+    progress: Progress = dataclasses.field(default_factory=SilentProgress)
+
+
+def evaluate_scenes(
+    sources: Sequence[SceneSource],
+    options: EvaluationOptions,
+    listener: Listener | None = None,
+) -> DepthReport:
+    """Measure every scene that can be measured.
+
+    Args:
+        sources: The scenes.
+        options: How.
+        listener: Who is told.
+
+    Returns:
+        The results, and what is wrong with the scenes that have none.
+
+    Raises:
+        WeightsError: If the weights cannot be read.
+        BackendUnavailableError: If a device or matcher that was asked for is not here.
+    """
+    listener = listener or Listener()
+    backend = matching_backend(options.backend)
+    device = resolve_device(options.refine.device)
+    network = for_inference(load_weights(options.refine.weights, device))
+    _warm_up(network, options.refine)
+    results, failed = [], {}
+    with listener.progress.stage("Evaluating", len(sources)) as advance:
+        for source in sources:
+            try:
+                result = _measure_scene(source, network, options, backend, advance)
+            except ResDepthError as error:  # also a matcher that failed on it
+                failed[source.name] = " ".join(str(error).split())
+                if listener.on_failure:
+                    listener.on_failure(source.name, failed[source.name])
+            else:
+                results.append(result)
+    return DepthReport(
+        date=datetime.datetime.now(datetime.UTC).date(),
+        weights_sha256=weights_hash(options.refine.weights),
+        refine=options.refine,
+        stereo=options.stereo,
+        max_residual=options.max_residual,
+        versions=versions(),
+        scenes=tuple(results),
+        failed=failed,
+    )
+
+
+def _measure_scene(
+    source: SceneSource,
+    network: ResDepthNet,
+    options: EvaluationOptions,
+    backend: StereoBackend,
+    on_share: Callable[[float], None],
+) -> SceneResult:
+    num_sources = max(1, network.config.num_sources)
+    wanted = CaseOptions(stereo=options.stereo, num_sources=num_sources)
+
+    def measured(case: DepthCase) -> CaseResult:
+        logger.debug("%s: %s", source.name, case.name)
+        initial = initial_depth(
+            source.name, case, backend, options.stereo, options.cache
+        )
+        if not (initial.depth > 0).any():
+            raise WorkspaceError(f"{case.name}: no pixel has an initial depth.")
+        return measure_case(
+            case, initial, network, options.refine, options.max_residual
+        )
+
+    cases = source.read(wanted)
+    results = []
+    for read_case in cases:
+        results.append(measured(read_case()))
+        on_share(1 / len(cases))
+    return SceneResult(name=source.name, cases=tuple(results))
+
+
+def _warm_up(network: ResDepthNet, config: RefineConfig) -> None:
+    """Refine a tiny view: the first call is not measured."""
+    size = _WARM_UP_PX
+    gray = np.random.default_rng(0).random((size, size), dtype=np.float32)
+    K = np.array([[size, 0, size / 2], [0, size, size / 2], [0, 0, 1.0]])
+    right = np.eye(3, 4)
+    right[0, 3] = -0.1
+    source = SourceView(gray=gray, K=K, source_from_reference=right)
+    depth = np.ones_like(gray)
+    inputs = ViewInputs(depth=depth, gray=gray, K=K, sources=(source,))
+    refine_view(inputs, network, config)

@@ -1,0 +1,104 @@
+"""The three depth maps of a case against its truth: unfiltered, its median, refined.
+
+The protocol is the paper's: unfiltered depth of a matcher, the 5 x 5 median of it as
+the plain baseline, and refined depth; residuals beyond a limit are discarded.
+"""
+
+import dataclasses
+from collections.abc import Mapping
+
+import numpy as np
+import numpy.typing as npt
+
+from resdepth_colmap.config import RefineConfig
+from resdepth_colmap.evaluation.datasets.sample import DepthCase, InitialDepth
+from resdepth_colmap.evaluation.depth.sample_refinement import refine_case
+from resdepth_colmap.evaluation.metrics.depth_metrics import median_filtered
+from resdepth_colmap.evaluation.metrics.depth_regions import edge_region
+from resdepth_colmap.evaluation.metrics.pooled_metrics import ErrorSample
+from resdepth_colmap.network.unet import ResDepthNet
+
+ARMS = ("unfiltered", "median", "refined")
+REGIONS = ("all", "edges", "flat")
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
+class CaseResult:
+    """What was measured on one view.
+
+    Attributes:
+        name: That of the case.
+        origin: Who made the initial depth.
+        errors: By region, then by arm; the keys are those of `REGIONS` and `ARMS`.
+        seen: Errors of the initial depth where the first source sees the surface too;
+            None if that is not known.
+        seen_median_relative_error: Median there of error over true depth; likewise.
+        megapixels: Size of the view, in millions of pixels.
+        matching_cpu_s: Processor seconds of all threads; None if depth was there.
+        refining_cpu_s: Likewise, of all passes of the last round.
+    """
+
+    name: str
+    origin: str
+    errors: Mapping[str, Mapping[str, ErrorSample]]
+    seen: ErrorSample | None
+    seen_median_relative_error: float | None
+    megapixels: float
+    matching_cpu_s: float | None
+    refining_cpu_s: float
+
+
+def measure_case(
+    case: DepthCase,
+    initial: InitialDepth,
+    network: ResDepthNet,
+    config: RefineConfig,
+    max_residual: float | None,
+) -> CaseResult:
+    """Refine the initial depth and compare all three maps with the truth.
+
+    Args:
+        case: The view and its truth.
+        initial: Its initial depth, of the same size.
+        network: On the device to run on.
+        config: Rounds, passes and tiles.
+        max_residual: Larger errors, in units, are discarded; None = none is.
+    """
+    truth, depth = case.truth, initial.depth
+    refined = refine_case(case, initial, network, config)
+    arms = {
+        "unfiltered": depth,
+        "median": median_filtered(depth),
+        "refined": refined.depth,
+    }
+    edges = edge_region(truth)
+    regions = {"all": None, "edges": edges, "flat": ~edges}
+    seen = case.seen
+    return CaseResult(
+        name=case.name,
+        origin=initial.origin,
+        errors={
+            region: {
+                arm: ErrorSample.of(values, truth, inside, max_residual)
+                for arm, values in arms.items()
+            }
+            for region, inside in regions.items()
+        },
+        seen=None if seen is None else ErrorSample.of(depth, truth, seen, max_residual),
+        seen_median_relative_error=None
+        if seen is None
+        else _median_relative_error(case, initial, seen),
+        megapixels=case.megapixels,
+        matching_cpu_s=initial.cpu_s,
+        refining_cpu_s=refined.cpu_s,
+    )
+
+
+def _median_relative_error(
+    case: DepthCase, initial: InitialDepth, seen: npt.NDArray[np.bool_]
+) -> float:
+    counted = seen & (case.truth > 0)
+    if not counted.any():
+        return float("nan")
+    truth = case.truth[counted]
+    return float(np.median(np.abs(initial.depth[counted] - truth) / truth))

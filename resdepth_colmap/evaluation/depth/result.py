@@ -1,0 +1,177 @@
+"""The result of comparing depth maps with the truth, scene by scene and overall."""
+
+import dataclasses
+import datetime
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from resdepth_colmap.config import RefineConfig, StereoConfig
+from resdepth_colmap.evaluation.depth.methods import ARMS, REGIONS, CaseResult
+from resdepth_colmap.evaluation.metrics.depth_metrics import DepthMetrics
+from resdepth_colmap.evaluation.metrics.pooled_metrics import ErrorSample, pooled
+
+Errors = Mapping[str, Mapping[str, ErrorSample]]
+"""By region, then by arm."""
+
+_REFINE_OPTIONS = ("passes", "rounds", "keep_confirmed", "tile_px", "overlap_px")
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class SceneResult:
+    """What was measured on one scene.
+
+    Attributes:
+        name: What it is called.
+        cases: One result a view.
+    """
+
+    name: str
+    cases: tuple[CaseResult, ...]
+
+    @property
+    def errors(self) -> Errors:
+        """Over the pixels of all views."""
+        return pooled_errors([case.errors for case in self.cases])
+
+    @property
+    def mae_ratio(self) -> float:
+        """Mean absolute error, refined over unfiltered; NaN if that is 0."""
+        arms = self.errors["all"]
+        return _ratio(arms["refined"].metrics.mae, arms["unfiltered"].metrics.mae)
+
+    @property
+    def medae_ratio(self) -> float:
+        """Median absolute error, refined over unfiltered; NaN if that is 0."""
+        arms = self.errors["all"]
+        return _ratio(arms["refined"].metrics.medae, arms["unfiltered"].metrics.medae)
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Plain values, ready for JSON."""
+        mapping: dict[str, Any] = {
+            "initial": sorted({case.origin for case in self.cases}),
+            "num_views": len(self.cases),
+            "view_names": [case.name for case in self.cases],
+            **plain_errors(self.errors),
+        }
+        if all(case.seen is not None for case in self.cases):
+            mapping["unfiltered_seen_by_both"] = self._seen()
+        mapping |= {
+            "matching_cpu_s_per_mp": self._per_megapixel("matching_cpu_s"),
+            "refining_cpu_s_per_mp": self._per_megapixel("refining_cpu_s"),
+            "mae_ratio": plain(self.mae_ratio),
+            "medae_ratio": plain(self.medae_ratio),
+        }
+        if len(self.cases) > 1:
+            mapping["views"] = {
+                case.name: {"initial": case.origin, **plain_errors(case.errors)}
+                for case in self.cases
+            }
+        return mapping
+
+    def _seen(self) -> dict[str, float | int | None]:
+        samples = [case.seen for case in self.cases if case.seen is not None]
+        medians = [case.seen_median_relative_error for case in self.cases]
+        finite = [m for m in medians if m is not None and math.isfinite(m)]
+        return {
+            **plain_metrics(pooled(samples).metrics),
+            "median_relative_error": plain(_mean(finite)),
+        }
+
+    def _per_megapixel(self, name: str) -> float | None:
+        timed = [c for c in self.cases if getattr(c, name) is not None]
+        megapixels = sum(case.megapixels for case in timed)
+        if not megapixels:
+            return None
+        seconds = sum(float(getattr(case, name)) for case in timed)
+        return round(seconds / megapixels, 2)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class DepthReport:
+    """The comparison's result, and what it was made with.
+
+    Attributes:
+        date: Day of the measurement.
+        weights_sha256: Hash of the weights file.
+        refine: Options of the refinement.
+        stereo: Options of the matcher.
+        max_residual: Larger errors were discarded, in units; None = none was.
+        versions: Of Python and the packages that matter.
+        scenes: One result a scene.
+        failed: What is wrong with each scene that could not be measured, by name.
+    """
+
+    date: datetime.date
+    weights_sha256: str
+    refine: RefineConfig
+    stereo: StereoConfig
+    max_residual: float | None
+    versions: Mapping[str, str]
+    scenes: tuple[SceneResult, ...]
+    failed: Mapping[str, str]
+
+    @property
+    def errors(self) -> Errors | None:
+        """Over the pixels of all scenes; None without any."""
+        if not self.scenes:
+            return None
+        return pooled_errors([scene.errors for scene in self.scenes])
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Plain values, ready for JSON; no path of this machine among them."""
+        refine = self.refine.to_mapping()
+        errors = self.errors
+        return {
+            "date": self.date.isoformat(),
+            "weights_sha256": self.weights_sha256,
+            "options": {
+                "refine": {name: refine[name] for name in _REFINE_OPTIONS},
+                "stereo": self.stereo.to_mapping(),
+                "max_residual": self.max_residual,
+            },
+            "versions": dict(self.versions),
+            "scenes": {scene.name: scene.to_mapping() for scene in self.scenes},
+            "overall": None if errors is None else plain_errors(errors),
+            "mean": {
+                "mae_ratio": plain(_mean([s.mae_ratio for s in self.scenes])),
+                "medae_ratio": plain(_mean([s.medae_ratio for s in self.scenes])),
+            },
+            "failed": dict(self.failed),
+        }
+
+
+def pooled_errors(errors: Sequence[Errors]) -> Errors:
+    """The errors over all pixels of several results, by region and arm."""
+    return {
+        region: {arm: pooled([it[region][arm] for it in errors]) for arm in ARMS}
+        for region in REGIONS
+    }
+
+
+def plain_errors(errors: Errors) -> dict[str, Any]:
+    """For JSON: the arms of the whole map by their names, the regions beside them."""
+    by_region = {
+        region: {arm: plain_metrics(arms[arm].metrics) for arm in ARMS}
+        for region, arms in errors.items()
+    }
+    return {**by_region["all"], **{r: by_region[r] for r in REGIONS if r != "all"}}
+
+
+def plain_metrics(metrics: DepthMetrics) -> dict[str, float | int | None]:
+    """For JSON: six digits, None where there is no number."""
+    values = metrics.to_mapping()
+    return {k: v if v is None else round(v, 6) for k, v in values.items()}
+
+
+def plain(value: float) -> float | None:
+    """For JSON: six digits, None for NaN."""
+    return None if math.isnan(value) else round(value, 6)
+
+
+def _ratio(value: float, reference: float) -> float:
+    return value / reference if reference else float("nan")
+
+
+def _mean(values: Sequence[float]) -> float:
+    return sum(values) / len(values) if values else float("nan")

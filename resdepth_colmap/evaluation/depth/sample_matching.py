@@ -1,0 +1,147 @@
+"""Initial depth of a case: what is there, or matched now, by COLMAP or by us."""
+
+import functools
+import re
+import time
+from collections.abc import Sequence
+
+import numpy as np
+
+from resdepth_colmap.config import StereoBackend, StereoConfig
+from resdepth_colmap.errors import BackendUnavailableError, ConfigError
+from resdepth_colmap.evaluation.datasets.sample import DepthCase, InitialDepth
+from resdepth_colmap.evaluation.depth.colmap_pair import match_by_colmap
+from resdepth_colmap.evaluation.depth.match_cache import MatchCache, Matching
+from resdepth_colmap.matching.patch_match import MatchView, match_view
+from resdepth_colmap.scene import DepthMap
+
+ORIGINS = {
+    StereoBackend.CPU: "our PatchMatch (CPU)",
+    StereoBackend.COLMAP: "COLMAP's PatchMatch (CUDA), unfiltered",
+}
+_WARM_UP_PX = 32
+_UNSAFE = re.compile(r"[^\w.-]+", re.ASCII)
+
+
+def matching_backend(requested: StereoBackend) -> StereoBackend:
+    """Who matches: COLMAP where pycolmap has CUDA, else we do.
+
+    Raises:
+        ConfigError: If existing maps were asked for: those are no one's to match.
+        BackendUnavailableError: If COLMAP was asked for and has no CUDA here.
+    """
+    if requested is StereoBackend.EXISTING:
+        raise ConfigError(
+            "--stereo existing: the scenes have no depth maps to compare; use auto, "
+            "cpu or colmap, or evaluate depth on a workspace that has maps."
+        )
+    if requested is StereoBackend.CPU:
+        return StereoBackend.CPU
+    import pycolmap
+
+    if pycolmap.has_cuda:
+        return StereoBackend.COLMAP
+    if requested is StereoBackend.COLMAP:
+        raise BackendUnavailableError(
+            "COLMAP's PatchMatch needs CUDA, and this pycolmap has none; use "
+            "--stereo cpu, or install pycolmap-cuda12 on a machine with an NVIDIA GPU."
+        )
+    return StereoBackend.CPU
+
+
+def initial_depth(
+    scene: str,
+    case: DepthCase,
+    backend: StereoBackend,
+    config: StereoConfig,
+    cache: MatchCache | None = None,
+) -> InitialDepth:
+    """The depth that a case starts from.
+
+    Args:
+        scene: Name of its scene, for the file in the cache.
+        case: The view; depth that it has already is taken.
+        backend: Who matches it otherwise, as `matching_backend` says.
+        config: Options of the matcher.
+        cache: Where matched depth is kept.
+    """
+    if case.initial is not None:
+        return case.initial
+    views = (case.reference, *case.sources)
+    name = cache_name(scene, case.name, backend)
+    found = cache.find(name, views, case.depth_range, config) if cache else None
+    if found is None:
+        found = _match(views, case.depth_range, backend, config)
+        if cache:
+            cache.add(name, views, case.depth_range, config, found)
+    return InitialDepth(
+        depth=found.depth,
+        origin=ORIGINS[backend],
+        cpu_s=found.cpu_s or None,
+        source_depths=found.source_depths,
+    )
+
+
+def cache_name(scene: str, case: str, backend: StereoBackend) -> str:
+    """What the file of a case in the cache begins with."""
+    return _UNSAFE.sub("_", f"{scene}-{case}-{backend}")
+
+
+def _match(
+    views: Sequence[MatchView],
+    depth_range: tuple[float, float],
+    backend: StereoBackend,
+    config: StereoConfig,
+) -> Matching:
+    if backend is StereoBackend.COLMAP:
+        depth = match_by_colmap(views, depth_range, config)
+        return Matching(depth=depth, cpu_s=0.0)  # it ran on the GPU
+    _compile()
+    return _match_here(views, depth_range, config)
+
+
+def _match_here(
+    views: Sequence[MatchView], depth_range: tuple[float, float], config: StereoConfig
+) -> Matching:
+    """Match the first view, in both passes unless `geom_consistency` is off.
+
+    The photometric maps of the sources, which the geometric pass and the refinement
+    use, count for the sources and not for this view, as in a workspace, where each is
+    made once.
+    """
+    start = time.process_time()
+    found = match_view(views[0], views[1:], depth_range, config)
+    cpu_s = time.process_time() - start
+    source_depths = _source_depths(views, depth_range, config)
+    if config.geom_consistency:
+        start = time.process_time()
+        found = match_view(
+            *(views[0], views[1:], depth_range, config),
+            start=found,
+            source_depths=source_depths,
+        )
+        cpu_s += time.process_time() - start
+    return Matching(depth=found.depth, cpu_s=cpu_s, source_depths=tuple(source_depths))
+
+
+def _source_depths(
+    views: Sequence[MatchView], depth_range: tuple[float, float], config: StereoConfig
+) -> list[DepthMap]:
+    """Photometric depth of every view but the first, each from all the others."""
+    found = []
+    for index in range(1, len(views)):
+        others = [*views[:index], *views[index + 1 :]]
+        found.append(match_view(views[index], others, depth_range, config).depth)
+    return found
+
+
+@functools.cache
+def _compile() -> None:
+    """Match a tiny pair, once: compiling is not measured."""
+    size = _WARM_UP_PX
+    gray = np.random.default_rng(0).random((size, size), dtype=np.float32)
+    K = np.array([[size, 0, size / 2], [0, size, size / 2], [0, 0, 1.0]])
+    left, right = np.eye(3, 4), np.eye(3, 4)
+    right[0, 3] = -0.1
+    views = [MatchView(gray=gray, K=K, cam_from_world=pose) for pose in (left, right)]
+    _match_here(views, (1.0, 2.0), StereoConfig(num_iterations=1))

@@ -1,0 +1,117 @@
+"""Refining a case as a workspace would be: its sources' maps in earlier rounds, too."""
+
+import functools
+import time
+from typing import NamedTuple
+
+from resdepth_colmap.config import RefineConfig
+from resdepth_colmap.evaluation.datasets.sample import (
+    DepthCase,
+    InitialDepth,
+    source_from_reference,
+)
+from resdepth_colmap.matching.patch_match import MatchView
+from resdepth_colmap.network.unet import ResDepthNet
+from resdepth_colmap.pipeline.refine.cross_view import NUM_SOURCE_MAPS, SourceMap
+from resdepth_colmap.pipeline.refine.view import SourceView, ViewInputs, refine_view
+from resdepth_colmap.scene import DepthMap, UnitColors
+
+
+class RefinedCase(NamedTuple):
+    """What became of a case.
+
+    Attributes:
+        depth: Of its reference, shape (H, W), in units.
+        cpu_s: Processor seconds of all threads, for the last round of the reference:
+            earlier ones count for the views that they refine, as in a workspace.
+    """
+
+    depth: DepthMap
+    cpu_s: float
+
+
+class _CaseView(NamedTuple):
+    """One of a case's views; no depth = there is no map of it."""
+
+    view: MatchView
+    depth: DepthMap | None
+    colors: UnitColors | None
+
+
+def refine_case(
+    case: DepthCase, initial: InitialDepth, network: ResDepthNet, config: RefineConfig
+) -> RefinedCase:
+    """Refine the depth of a case's reference.
+
+    In earlier rounds its sources are refined as far as the case shows what they look
+    at: from each other and from the reference.
+
+    Args:
+        case: The views.
+        initial: Depth of the reference, and of the sources where there is any.
+        network: On the device to run on.
+        config: Rounds, passes and tiles.
+    """
+    views = _views(case, initial)
+    num_earlier = config.rounds - 1 if network.config.source_depth else 0
+
+    @functools.cache
+    def map_of(index: int, num_rounds: int) -> DepthMap | None:
+        depth = views[index].depth
+        if num_rounds == 0 or depth is None or not (depth > 0).any():
+            return depth
+        return refine_view(inputs(index, num_rounds - 1), network, config).depth
+
+    def inputs(index: int, num_rounds: int) -> ViewInputs:
+        """Of a view after so many rounds of the others."""
+        others = [other for other in range(len(views)) if other != index]
+        maps = {other: map_of(other, num_rounds) for other in others[:NUM_SOURCE_MAPS]}
+        return _inputs(views, index, maps)
+
+    own = inputs(0, num_earlier)
+    start = time.process_time()
+    depth = refine_view(own, network, config).depth
+    return RefinedCase(depth, time.process_time() - start)
+
+
+def _views(case: DepthCase, initial: InitialDepth) -> list[_CaseView]:
+    """The reference first."""
+    found = [_CaseView(case.reference, initial.depth, case.colors)]
+    for place, source in enumerate(case.sources):
+        depths = initial.source_depths[place : place + 1] or (None,)
+        colors = case.source_colors[place : place + 1] or (None,)
+        found.append(_CaseView(source, *depths, *colors))
+    return found
+
+
+def _inputs(
+    views: list[_CaseView], index: int, maps: dict[int, DepthMap | None]
+) -> ViewInputs:
+    own = views[index]
+    assert own.depth is not None  # noqa: S101 (asked only where it is there)
+    others = [view.view for place, view in enumerate(views) if place != index]
+    return ViewInputs(
+        depth=own.depth,
+        gray=own.view.gray,
+        colors=own.colors,
+        K=own.view.K,
+        sources=tuple(
+            SourceView(
+                gray=source.gray,
+                K=source.K,
+                source_from_reference=source_from_reference(own.view, source),
+            )
+            for source in others
+        ),
+        source_maps=tuple(
+            SourceMap(
+                depth=depth,
+                K=views[place].view.K,
+                source_from_reference=source_from_reference(
+                    own.view, views[place].view
+                ),
+            )
+            for place, depth in maps.items()
+            if depth is not None
+        ),
+    )

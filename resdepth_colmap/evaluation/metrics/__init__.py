@@ -1,0 +1,1 @@
+"""Figures of depth maps: against the truth, and without any."""

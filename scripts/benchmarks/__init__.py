@@ -1,0 +1,1 @@
+"""What measures resdepth-colmap for docs/benchmarks.md."""

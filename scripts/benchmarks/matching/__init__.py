@@ -1,0 +1,1 @@
+"""The CPU PatchMatch: how right and how fast it is."""

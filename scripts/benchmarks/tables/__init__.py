@@ -1,0 +1,1 @@
+"""Documents made of measured figures (docs/measurements/*.json)."""
