@@ -46,18 +46,18 @@ fix: $(READY)  ## what a tool can mend
 	$(BIN)/ruff format .
 
 bench: $(READY)  ## measure what docs/benchmarks.md reports
-	$(BIN)/python scripts/bench_matching.py
-	$(BIN)/python scripts/bench_stereo_memory.py
-	$(BIN)/python scripts/bench_middlebury.py
-	$(BIN)/python scripts/bench_middlebury.py --without-network
-	$(BIN)/python scripts/bench_held_out.py
-	$(BIN)/python scripts/bench_agreement.py
-	$(BIN)/python scripts/bench_refine.py
-	$(BIN)/python scripts/bench_workspaces.py
-	$(BIN)/python scripts/bench_compare.py
-	$(BIN)/python scripts/bench_cloud.py
-	$(BIN)/python scripts/bench_commands.py
-	$(BIN)/python scripts/make_tables.py
+	$(BIN)/python -m scripts.benchmarks.matching.quality
+	$(BIN)/python -m scripts.benchmarks.matching.stereo_memory
+	$(BIN)/python -m scripts.benchmarks.middlebury
+	$(BIN)/python -m scripts.benchmarks.middlebury --without-network
+	$(BIN)/python -m scripts.benchmarks.held_out
+	$(BIN)/python -m scripts.benchmarks.agreement
+	$(BIN)/python -m scripts.benchmarks.refine
+	$(BIN)/python -m scripts.benchmarks.workspaces
+	$(BIN)/python -m scripts.benchmarks.compare
+	$(BIN)/python -m scripts.benchmarks.cloud
+	$(BIN)/python -m scripts.benchmarks.commands
+	$(BIN)/python -m scripts.benchmarks.make_tables
 
 clean:
 	rm -rf $(VENV) demo

@@ -1,6 +1,6 @@
 """Average the weights of several files of one network.
 
-    python scripts/average_weights.py mean.safetensors first.safetensors ...
+    python -m scripts.average_weights mean.safetensors first.safetensors ...
 
 The mean of weights along one training is often better than each of them, on scenes that
 are unlike the training's most of all (Izmailov et al., "Averaging Weights Leads to

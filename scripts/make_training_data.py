@@ -1,6 +1,6 @@
 """Render rooms and match them: data of the kind that the weights are trained on.
 
-    python scripts/make_training_data.py rooms --num-scenes 300 --workers 2
+    python -m scripts.make_training_data rooms --num-scenes 300 --workers 2
 
 Two views in most rooms, three or four in some, so that the network sees maps from one
 source and from several. Goes on where it stopped.

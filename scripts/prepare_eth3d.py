@@ -1,6 +1,6 @@
 """Fetch and unpack ETH3D's scenes for `resdepth-colmap evaluate eth3d`.
 
-    python scripts/prepare_eth3d.py ETH3D/ [SCENE ...] [--part dslr_scan_eval]
+    python -m scripts.prepare_eth3d ETH3D/ [SCENE ...] [--part dslr_scan_eval]
 
 Without names the paper's seven scenes. What is there is kept; a download that stopped
 goes on. Sizes and checksums are written to ETH3D/eth3d.lock.json at the first download
@@ -13,7 +13,7 @@ import sys
 from pathlib import Path
 
 from resdepth_colmap.errors import ResDepthError
-from resdepth_colmap.evaluation.eth3d_archives import (
+from scripts.eth3d_archives import (
     BASE_URL,
     DEPTH_PARTS,
     PARTS,

@@ -77,7 +77,7 @@ def eth3d(
 
     ETH3D_ROOT is the folder that the archives of the high-resolution multi-view scenes
     were unpacked into: dslr_undistorted, dslr_jpg and dslr_depth of each
-    (scripts/prepare_eth3d.py fetches them); the environment variable RESDEPTH_ETH3D may
+    (https://www.eth3d.net/datasets); the environment variable RESDEPTH_ETH3D may
     name it instead. Depth is matched in each pair's first image
     against the second one alone. The table has the paper's figures beside it. A broken
     scene does not stop the others; the exit code is 1 then.

@@ -17,6 +17,7 @@ from resdepth_colmap.io.files import safe_name
 from resdepth_colmap.io.images import image_size
 from resdepth_colmap.scene import DepthMap
 
+DOWNLOADS = "https://www.eth3d.net/datasets"
 UNDISTORTED = "dslr_calibration_undistorted"
 DISTORTED = "dslr_calibration_jpg"
 TRUTH = "ground_truth_depth/dslr_images"
@@ -89,7 +90,7 @@ class Eth3dScene:
             if not (self.path / folder).is_dir():
                 raise WorkspaceError(
                     f"{self.path}: no {folder}/ in it; unpack "
-                    f"{self.name}_{archive}.7z (scripts/prepare_eth3d.py fetches it)."
+                    f"{self.name}_{archive}.7z, from {DOWNLOADS}, there."
                 )
 
 
@@ -103,7 +104,7 @@ def find_eth3d_scenes(root: Path) -> tuple[Eth3dScene, ...]:
     if not root.is_dir():
         raise WorkspaceError(
             f"{root}: no such folder; point at the one that the archives of ETH3D were "
-            "unpacked into (scripts/prepare_eth3d.py makes one)."
+            f"unpacked into ({DOWNLOADS})."
         )
     found = [child for child in _folders(root) if _is_scene(child)]
     if found:
@@ -179,7 +180,7 @@ def _where_instead(root: Path) -> str:
                 return f"no scene in it, but in a folder of it; point at {candidate}"
     return (
         f"no ETH3D scene in it (a folder with {UNDISTORTED}/); unpack the archives "
-        "there (scripts/prepare_eth3d.py fetches them)"
+        f"of {DOWNLOADS} there"
     )
 
 

@@ -11,7 +11,7 @@ from workspaces import identity_weights
 
 from resdepth_colmap.cli.main import main
 from resdepth_colmap.evaluation.datasets.paper import PAPER_MAX_RESIDUAL
-from resdepth_colmap.evaluation.tables import middlebury_table
+from scripts.benchmarks.tables.documents import middlebury_table
 
 FAST = ("--num-iterations", "2", "--window-radius", "3")
 

@@ -263,7 +263,7 @@ def test_an_empty_folder_says_how_to_fill_it(tmp_path: Path) -> None:
     (tmp_path / "empty").mkdir()
     result = evaluate(tmp_path, tmp_path / "empty")
     assert result.exit_code == 1
-    assert "scripts/prepare_eth3d.py fetches them" in result.stderr
+    assert "unpack the archives of https://www.eth3d.net" in result.stderr
 
 
 def test_a_malformed_file_of_pairs_is_one_line(

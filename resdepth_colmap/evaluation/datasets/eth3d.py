@@ -32,6 +32,7 @@ from resdepth_colmap.io.colmap.model import read_scene
 from resdepth_colmap.io.distorted_camera import DistortedView, read_distorted_views
 from resdepth_colmap.io.eth3d import (
     DISTORTED,
+    DOWNLOADS,
     UNDISTORTED,
     Eth3dScene,
     find_eth3d_scenes,
@@ -91,8 +92,8 @@ def eth3d_sources(root: Path, options: Eth3dOptions) -> tuple[SceneSource, ...]:
     def read(name: str, wanted: CaseOptions) -> list[LazyCase]:
         if name not in scenes:
             raise WorkspaceError(
-                f"{root}: no scene {name} in it; there are: {', '.join(scenes)} "
-                f"(scripts/prepare_eth3d.py fetches {name})."
+                f"{root}: no scene {name} in it; there are: {', '.join(scenes)}; "
+                f"download {name} from {DOWNLOADS}."
             )
         reader = _SceneReader(scenes[name], options.image_width_px)
         if path is not None and name in listed:

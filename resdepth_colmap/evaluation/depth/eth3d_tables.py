@@ -6,14 +6,15 @@ from resdepth_colmap.evaluation.datasets.paper import (
     PaperRow,
 )
 from resdepth_colmap.evaluation.depth.tables import (
+    DEPTHS,
     OVERALL,
+    Measured,
     origins,
     parts_table,
     residuals_said,
     result_rows,
 )
 from resdepth_colmap.evaluation.markdown import count, markdown_table, number, percent
-from resdepth_colmap.evaluation.tables import DEPTHS, Measured
 
 _CAVEAT = (
     "The paper's figures are those of its table, not measured here: of other pairs, "

@@ -9,8 +9,11 @@ from resdepth_colmap.evaluation.markdown import (
     number,
     percent,
 )
-from resdepth_colmap.evaluation.tables import DEPTHS, Measured
 
+Measured = Mapping[str, Any]
+"""The JSON of a result, parsed."""
+
+DEPTHS = {"unfiltered": "unfiltered", "median": "5 x 5 median", "refined": "refined"}
 OVERALL = "**overall**"
 _PARTS = {"edges": "edges", "flat": "flat areas"}
 
