@@ -33,6 +33,11 @@ class Fuser(enum.StrEnum):
     COLMAP = "colmap"
 
 
+def option(name: str, default: Any) -> Any:
+    """An attribute of a configuration whose option has another name."""
+    return dataclasses.field(default=default, metadata={"option": name})
+
+
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Config:
     """Base of the configurations: to and from plain mappings."""
@@ -57,7 +62,11 @@ class Config:
 
     def _check(self, holds: bool, expected: str, **values: object) -> None:
         if not holds:
-            shown = ", ".join(f"{key}={value!r}" for key, value in values.items())
+            names = {
+                field.name: field.metadata.get("option", field.name)
+                for field in dataclasses.fields(self)
+            }
+            shown = ", ".join(f"{names[k]}={value!r}" for k, value in values.items())
             raise ConfigError(f"{shown} but expected {expected}.")
 
 
@@ -191,13 +200,13 @@ class RefineConfig(Config):
     Attributes:
         input: Which maps to start from: auto (the fuller one), or a kind of map,
             that is the word before ".bin" in its file name.
-        passes: How often to warp and refine (the paper's iter: 2).
-        rounds: How often all views are refined: from the second round on each sees what
-            the round before has made of the others' maps. One round is all for a
-            network that sees no maps of others.
-        keep_confirmed: Keep the initial depth of a pixel where another view's map or
-            the photographs confirm it and the network changes it only a little, with
-            the photographs against it; or little beside the error that it expects.
+        inner_iterations: How often to warp and refine (the paper's iter: 2).
+        outer_iterations: Outer iterations over all views: from the second on, each view
+            is compared with the refined maps of the other views, not with their initial
+            ones. A network that sees no other maps needs one.
+        update_gating: Keep the initial depth of a pixel that other maps or the
+            photographs support where the network's update is small and the photographs
+            speak against it, or where it is small beside the network's expected error.
         tile_px: Side of a square tile, in pixels.
         overlap_px: Overlap of neighbouring tiles, in pixels.
         device: Where the network runs.
@@ -205,9 +214,9 @@ class RefineConfig(Config):
     """
 
     input: str = "auto"
-    passes: int = 1
-    rounds: int = 3
-    keep_confirmed: bool = True
+    inner_iterations: int = option("passes", 1)
+    outer_iterations: int = option("rounds", 3)
+    update_gating: bool = True
     tile_px: int = 512
     overlap_px: int = 128
     device: Device = Device.AUTO
@@ -215,7 +224,7 @@ class RefineConfig(Config):
 
     def __post_init__(self) -> None:
         """Check the ranges once, so that no later code has to."""
-        for name in ("passes", "rounds"):
+        for name in ("inner_iterations", "outer_iterations"):
             value = getattr(self, name)
             self._check(1 <= value <= 10, "1 to 10", **{name: value})
         self._check(

@@ -91,7 +91,7 @@ def run_record(names: tuple[str, ...]) -> dict[str, Any]:
     return {
         "finished": "2026-11-22T06:38:42+00:00",
         "workspace": "scene",
-        "options": {"refine": {"passes": 1}, "in_place": False},
+        "options": {"refine": {"inner_iterations": 1}, "in_place": False},
         "versions": {"resdepth-colmap": "0.1.0"},
         "weights_sha256": "0" * 64,
         "device": "cpu",

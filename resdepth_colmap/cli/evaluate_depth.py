@@ -28,7 +28,14 @@ from resdepth_colmap.config import RefineConfig, StereoBackend, StereoConfig
     required=True,
     type=click.Path(path_type=Path),
 )
-@config_options(RefineConfig, "passes", "rounds", "keep_confirmed", "weights", "device")
+@config_options(
+    RefineConfig,
+    "inner_iterations",
+    "outer_iterations",
+    "update_gating",
+    "weights",
+    "device",
+)
 @config_options(StereoConfig, skip=NO_MATCHER_OPTIONS)
 @max_residual_option
 @click.option(

@@ -60,7 +60,14 @@ CACHE_NAME = "resdepth-cache"
     default=StereoBackend.AUTO,
     text="Whose PatchMatch: COLMAP's (needs CUDA), or ours on the CPU.",
 )
-@config_options(RefineConfig, "passes", "rounds", "keep_confirmed", "weights", "device")
+@config_options(
+    RefineConfig,
+    "inner_iterations",
+    "outer_iterations",
+    "update_gating",
+    "weights",
+    "device",
+)
 @config_options(StereoConfig, skip=(*NO_MATCHER_OPTIONS, "max_num_sources"))
 @max_residual_option
 @click.option(

@@ -21,7 +21,7 @@ from resdepth_colmap.config import RefineConfig, StereoConfig
     "info scene/dense --json",
 )
 @workspace_argument
-@config_options(RefineConfig, "input", "passes", "rounds")
+@config_options(RefineConfig, "input", "inner_iterations", "outer_iterations")
 @config_options(StereoConfig, "max_image_size")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON instead of a table.")
 def info(workspace: Path, as_json: bool, **values: Any) -> None:

@@ -143,15 +143,20 @@ def attribute_helps(kind: type[Any]) -> dict[str, str]:
 
 
 def _option(field: "dataclasses.Field[Any]", text: str) -> Callable[[Command], Command]:
-    flag = "--" + field.name.replace("_", "-")
+    flag = "--" + field.metadata.get("option", field.name).replace("_", "-")
     if isinstance(field.default, bool):
         flag += f"/--no-{flag[2:]}" if field.default else ""
-        return click.option(flag, is_flag=True, default=field.default, help=text)
+        return click.option(
+            flag, field.name, is_flag=True, default=field.default, help=text
+        )
     if isinstance(field.default, enum.StrEnum):
         kind = type(field.default)
-        return enum_option(flag, kind=kind, default=field.default, text=text)
+        return enum_option(
+            flag, field.name, kind=kind, default=field.default, text=text
+        )
     return click.option(
         flag,
+        field.name,
         type=_click_type(field.default),
         default=field.default,
         show_default=field.default is not None,

@@ -18,9 +18,9 @@ def show_workspace(name: str, found: Mapping[str, Any]) -> None:
         found: `Comparison.to_mapping()`.
     """
     show_line("workspace", f"{name} ({len(found['views'])} views compared)")
-    for arm, facts in found["arms"].items():
+    for method, facts in found["methods"].items():
         normals = f"normals: {facts['normals']}"
-        show_line(arm, f"{facts['kind']} maps, {normals}")
+        show_line(method, f"{facts['kind']} maps, {normals}")
     for fuser, settings in found["fusion"].items():
         said = ", ".join(f"{key} {value:g}" for key, value in settings.items())
         show_line(f"fusion {fuser}", said)
@@ -38,22 +38,22 @@ def _show_clouds(clouds: Mapping[str, Any]) -> None:
     from rich.table import Table
 
     table = Table(title="clouds")
-    for header in ("fusion", "arm"):
+    for header in ("fusion", "method"):
         table.add_column(header)
     for header in ("points", "within", "accuracy", "complete", "F1"):
         table.add_column(header, justify="right")
     notes: dict[str, list[str]] = {}
-    for fuser, arms in clouds.items():
-        for arm, cloud in arms.items():
+    for fuser, methods in clouds.items():
+        for method, cloud in methods.items():
             for row in _cloud_rows(cloud):
-                table.add_row(_FUSERS[fuser], arm, *row)
+                table.add_row(_FUSERS[fuser], method, *row)
             if cloud["note"]:
                 said = f"{_FUSERS[fuser]}: {cloud['note']}"
-                notes.setdefault(said, []).append(arm)
+                notes.setdefault(said, []).append(method)
         table.add_section()
     show_table(table)
-    for said, of_arms in notes.items():
-        show_line("note", f"{', '.join(of_arms)}: {said}.")
+    for said, of_methods in notes.items():
+        show_line("note", f"{', '.join(of_methods)}: {said}.")
 
 
 def _cloud_rows(cloud: Mapping[str, Any]) -> list[list[str]]:
@@ -75,11 +75,13 @@ def _cloud_rows(cloud: Mapping[str, Any]) -> list[list[str]]:
 def _show_measures(found: Mapping[str, Any]) -> None:
     from resdepth_colmap.evaluation.metrics.measures import MEASURES
 
-    arms = found["measures"]
+    methods = found["measures"]
     measured = [
-        name for name in MEASURES if any(it[name] is not None for it in arms.values())
+        name
+        for name in MEASURES
+        if any(it[name] is not None for it in methods.values())
     ]
-    _show_means(arms, measured)
+    _show_means(methods, measured)
     for pair, differences in found["paired"].items():
         _show_differences(pair, differences, measured)
     width = max(map(len, measured)) + 2
@@ -87,14 +89,14 @@ def _show_measures(found: Mapping[str, Any]) -> None:
         click.echo(f"{name:<{width}}{MEASURES[name]}")
 
 
-def _show_means(arms: Mapping[str, Any], measured: Sequence[str]) -> None:
+def _show_means(methods: Mapping[str, Any], measured: Sequence[str]) -> None:
     from rich.table import Table
 
     table = Table("measure, %", title="means over the views")
-    for arm in arms:
-        table.add_column(arm, justify="right")
+    for method in methods:
+        table.add_column(method, justify="right")
     for name in measured:
-        table.add_row(name, *(_percent(values[name]) for values in arms.values()))
+        table.add_row(name, *(_percent(values[name]) for values in methods.values()))
     show_table(table)
 
 

@@ -39,8 +39,8 @@ def complete_from_background(
     after = _nearest_known(inverse_depth[:, ::-1], known[:, ::-1])[:, ::-1]
     background = np.fmin(before, after)
     background[np.isnan(background)] = np.median(inverse_depth[known])
-    completed = np.where(known, inverse_depth, background).astype(np.float32)
-    smooth = cv2.medianBlur(completed, SMOOTHED_PX)
+    filled_in = np.where(known, inverse_depth, background).astype(np.float32)
+    smooth = cv2.medianBlur(filled_in, SMOOTHED_PX)
     return np.where(known, inverse_depth, smooth).astype(np.float32)
 
 

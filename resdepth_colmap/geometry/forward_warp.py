@@ -16,7 +16,7 @@ REACH_PX = 0.25
 """How far a point reaches beyond the pixel that it falls into."""
 
 
-def carry_inverse_depth(
+def reproject_inverse_depth(
     source_inverse_depth: Tensor,
     source_K: Tensor,
     reference_K: Tensor,
@@ -61,11 +61,11 @@ def carry_inverse_depth(
         )
     )
     shape = (len(inverse_depth), 1, height_px + 2, width_px + 2)
-    carried = inverse_depth.new_zeros(shape).flatten(1)
+    reprojected = inverse_depth.new_zeros(shape).flatten(1)
     for column, row in itertools.product(columns, rows):
         pixels = (row * (width_px + 2) + column).flatten(1).long()
-        carried.scatter_reduce_(1, pixels, inverse_depth, reduce="amax")
-    return carried.reshape(shape)[..., 1:-1, 1:-1]
+        reprojected.scatter_reduce_(1, pixels, inverse_depth, reduce="amax")
+    return reprojected.reshape(shape)[..., 1:-1, 1:-1]
 
 
 def _inverse(pose: Tensor) -> Tensor:

@@ -6,7 +6,7 @@ from typing import Self
 
 from resdepth_colmap.config import Config
 
-CARRIED_CHANGE, CARRIED = "carried_change", "carried"
+REPROJECTED_CHANGE, REPROJECTED = "reprojected_change", "reprojected"
 """Channels of other views' depth maps in the reference: where they differ, and are."""
 
 RED, BLUE = "red", "blue"
@@ -53,8 +53,8 @@ class NetworkConfig(Config):
         confidence: Let it predict the scale of its own error.
         propagation_channels: Let a second, small network of so many channels mix each
             pixel's depth from those around it (docs/adr/0015); 0 = none.
-        second_look: Show that one the first source as it would look at the refined
-            depth, at the nearest and at the farthest around it, and let it take these.
+        source_resampling: Show that one the first source warped by the refined depth,
+            by the nearest and by the farthest around it, and let it take these.
         shared_features: Show that one what the U-Net's last convolution sees, too.
         normalisation: How inverse depth is scaled.
     """
@@ -72,7 +72,7 @@ class NetworkConfig(Config):
     last_block: bool = True
     confidence: bool = True
     propagation_channels: int = 72
-    second_look: bool = True
+    source_resampling: bool = True
     shared_features: bool = True
     normalisation: Normalisation = Normalisation.ROBUST
 
@@ -112,7 +112,7 @@ class NetworkConfig(Config):
             color=False,
             confidence=False,
             propagation_channels=0,
-            second_look=False,
+            source_resampling=False,
             shared_features=False,
             normalisation=Normalisation.BASELINE,
         )
@@ -133,9 +133,9 @@ class NetworkConfig(Config):
         return self.propagation_channels > 0 and self.residual
 
     @property
-    def looks_again(self) -> bool:
+    def resamples_source(self) -> bool:
         """Whether the second network looks at the first source again."""
-        return self.second_look and self.propagates and self.uses_sources
+        return self.source_resampling and self.propagates and self.uses_sources
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -150,7 +150,7 @@ class NetworkConfig(Config):
         if self.photo_consistency and self.uses_sources:
             names.append("photo_consistency")
         if self.source_depth and self.uses_sources and self.residual:
-            names += [CARRIED_CHANGE, CARRIED]
+            names += [REPROJECTED_CHANGE, REPROJECTED]
         if self.color and self.variant is not InputVariant.DEPTH_ONLY:
             names += [RED, BLUE]
         return tuple(names)
@@ -159,7 +159,7 @@ class NetworkConfig(Config):
     def propagation_inputs(self) -> tuple[str, ...]:
         """Names of what the second network sees, in order."""
         said = ["refined", "log_scale"] if self.confidence else ["refined"]
-        again = _AGAIN if self.looks_again else ()
+        again = _AGAIN if self.resamples_source else ()
         num_features = self.base_channels if self.shared_features else 0
         features = (f"feature_{index}" for index in range(num_features))
         return (*said, *self.channels, *again, *features)

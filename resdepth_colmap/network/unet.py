@@ -17,7 +17,7 @@ LOG_SCALE_LIMITS = (-8.0, 4.0)
 """The propagation sees the logarithm of the expected error clamped to these."""
 
 
-Look = Callable[[Tensor], Tensor]
+SampleSource = Callable[[Tensor], Tensor]
 """Grey values of the first source where normalised inverse depths, shape (B, C, H, W),
 would project into it, of that shape."""
 
@@ -94,21 +94,23 @@ class ResDepthNet(nn.Module):
                 len(config.propagation_inputs),
                 config.propagation_channels,
                 config.levels,
-                num_more=2 * config.looks_again,
+                num_more=2 * config.resamples_source,
             )
             if config.propagates
             else None
         )
 
-    def forward(self, stack: Tensor, look: Look | None = None) -> Refinement:
+    def forward(
+        self, stack: Tensor, sample_source: SampleSource | None = None
+    ) -> Refinement:
         """Refine a batch of tiles.
 
         Args:
             stack: Inputs in the order of `config.channels`, shape (B, C, H, W), float;
                 channel 0 is the normalised inverse depth unless the variant is
                 images-only. H and W are multiples of 2**levels.
-            look: Shows the first source at any depth; without it a network that looks
-                again sees black.
+            sample_source: Shows the first source at any depth; without it a network
+                with source resampling sees black.
 
         Returns:
             The refined inverse depth and its expected error, both normalised.
@@ -124,10 +126,16 @@ class ResDepthNet(nn.Module):
             residual = residual * torch.sigmoid(outputs[:, 1:2])
         refined = stack[:, :1] + residual if self.config.residual else residual
         log_scale = outputs[:, -1:] if self.config.confidence else None
-        return self._propagate(stack, Refinement(refined, log_scale), features, look)
+        return self._propagate(
+            stack, Refinement(refined, log_scale), features, sample_source
+        )
 
     def _propagate(
-        self, stack: Tensor, before: Refinement, features: Tensor, look: Look | None
+        self,
+        stack: Tensor,
+        before: Refinement,
+        features: Tensor,
+        sample_source: SampleSource | None,
     ) -> Refinement:
         if self.propagation is None:
             return before
@@ -136,9 +144,11 @@ class ResDepthNet(nn.Module):
             seen.append(before.log_scale.clamp(*LOG_SCALE_LIMITS))
         seen.append(self._squash(stack))
         more: tuple[Tensor, ...] = ()
-        if self.config.looks_again:
+        if self.config.resamples_source:
             more = extremes(before.inverse_depth)
-            seen.append(_seen_again(torch.cat([before.inverse_depth, *more], 1), look))
+            seen.append(
+                _seen_again(torch.cat([before.inverse_depth, *more], 1), sample_source)
+            )
             seen += [depth.clamp(-INPUT_LIMIT, INPUT_LIMIT) for depth in more]
         if self.config.shared_features:
             seen.append(features)
@@ -186,8 +196,8 @@ class ResDepthNet(nn.Module):
             )
 
 
-def _seen_again(depths: Tensor, look: Look | None) -> Tensor:
+def _seen_again(depths: Tensor, sample_source: SampleSource | None) -> Tensor:
     """The source at these depths; no gradient goes through where it is looked at."""
-    if look is None:
+    if sample_source is None:
         return torch.zeros_like(depths)
-    return look(depths.detach().float()).to(depths.dtype)
+    return sample_source(depths.detach().float()).to(depths.dtype)

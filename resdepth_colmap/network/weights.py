@@ -30,10 +30,13 @@ _OLDER = {
     "source_depth": False,
     "color": False,
     "propagation_channels": 0,
-    "second_look": False,
+    "source_resampling": False,
     "shared_features": False,
 }
 """Options that the headers of older files do not name, as those networks were."""
+
+_RENAMED = {"second_look": "source_resampling"}
+"""Options by the names that the headers of older files know them by."""
 
 WAY_OUT = "use a file that `resdepth-colmap train` wrote, or leave out --weights"
 
@@ -135,7 +138,7 @@ def _stored(value: Tensor) -> Tensor:
 def _read(path: Path) -> tuple[NetworkConfig, dict[str, Tensor]]:
     header = _header(path)
     try:
-        config = NetworkConfig.from_mapping({**_OLDER, **header["network"]})
+        config = _network_config(header["network"])
     except (ConfigError, TypeError) as error:
         raise WeightsError(f"{path}: unknown kind of network ({error})") from error
     try:
@@ -147,6 +150,11 @@ def _read(path: Path) -> tuple[NetworkConfig, dict[str, Tensor]]:
         if not torch.isfinite(value).all():
             raise WeightsError(f"{path}: {name} is not finite; {WAY_OUT}.")
     return config, tensors
+
+
+def _network_config(options: Mapping[str, Any]) -> NetworkConfig:
+    named = {_RENAMED.get(name, name): value for name, value in options.items()}
+    return NetworkConfig.from_mapping({**_OLDER, **named})
 
 
 def _loaded(value: Tensor) -> Tensor:

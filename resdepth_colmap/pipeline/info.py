@@ -201,7 +201,7 @@ def _estimate(
     matched = backend is StereoBackend.CPU
     pass_s = STEREO_S_PER_MEGAPIXEL_AND_PASS * total * slowness
     stereo_s = pass_s * len(passes_of(stereo)) if matched else 0.0
-    num_passes = refine.passes * refine.rounds
+    num_passes = refine.inner_iterations * refine.outer_iterations
     return Estimate(
         megapixels=total,
         stereo_s=stereo_s,

@@ -8,7 +8,7 @@ from resdepth_colmap.scene import Matrix
 from resdepth_colmap.synthetic import meshes, objects, thin_objects
 from resdepth_colmap.synthetic.meshes import Mesh, Rng
 from resdepth_colmap.synthetic.objects import SMALL, Builder
-from resdepth_colmap.synthetic.scene_builder import Furnisher
+from resdepth_colmap.synthetic.scene_builder import SceneBuilder
 from resdepth_colmap.synthetic.thin_objects import FURNITURE, THIN
 
 _ROWS: tuple[Builder, ...] = (objects.books, objects.pile)
@@ -29,39 +29,39 @@ def _any_turn(rng: Rng) -> Matrix:
     return meshes.turn_z(rng.uniform(0, 2 * np.pi))
 
 
-def fill_room(furnisher: Furnisher, low: Matrix, high: Matrix) -> Matrix:
+def fill_room(builder: SceneBuilder, low: Matrix, high: Matrix) -> Matrix:
     """Put furniture and clutter on the floor, crowded round a focus.
 
     Args:
-        furnisher: Takes them.
+        builder: Takes them.
         low: Lower corner of the room, shape (3,), metres.
         high: Upper corner.
 
     Returns:
         The focus, shape (3,); the camera looks at it roughly along +y.
     """
-    rng = furnisher.rng
+    rng = builder.rng
     depth = rng.uniform(-0.1, 0.5) * high[1]
     focus = np.array([rng.uniform(-0.3, 0.3) * high[0], depth, rng.uniform(0.4, 0.9)])
     kinds = (*FURNITURE, *FURNITURE, *THIN, objects.pile)
     for _ in range(int(rng.integers(7, 20))):
         thing = _any(rng, kinds)
         place = _spot(rng, focus, low, high)
-        furnisher.add(thing.moved([*place, 0], _any_turn(rng)))
+        builder.add(thing.moved([*place, 0], _any_turn(rng)))
         if thing.size[2] < 1.2 and rng.random() < 0.6:
-            _put_on_top(furnisher, place, float(thing.size[2]))
+            _put_on_top(builder, place, float(thing.size[2]))
     for _ in range(int(rng.integers(5, 25))):
         thing = _any(rng, SMALL if rng.random() < 0.6 else THIN)
         place = _spot(rng, focus, low, high)
-        furnisher.add(thing.moved([*place, 0], _any_turn(rng)))
+        builder.add(thing.moved([*place, 0], _any_turn(rng)))
     return focus
 
 
-def _put_on_top(furnisher: Furnisher, place: Matrix, height: float) -> None:
-    rng = furnisher.rng
+def _put_on_top(builder: SceneBuilder, place: Matrix, height: float) -> None:
+    rng = builder.rng
     for _ in range(int(rng.integers(1, 6))):
         x, y = place + rng.normal(0, 0.15, 2)
-        furnisher.add(objects.small_thing(rng).moved([x, y, height * 0.99]))
+        builder.add(objects.small_thing(rng).moved([x, y, height * 0.99]))
 
 
 def _spot(rng: Rng, focus: Matrix, low: Matrix, high: Matrix) -> Matrix:
@@ -71,29 +71,29 @@ def _spot(rng: Rng, focus: Matrix, low: Matrix, high: Matrix) -> Matrix:
     return np.asarray(np.clip([x, y], low[:2] + 0.25, high[:2] - 0.25))
 
 
-def lay_table(furnisher: Furnisher) -> Matrix:
+def lay_table(builder: SceneBuilder) -> Matrix:
     """A slab with props, and mostly a board or a cloth behind them.
 
     Returns:
         The middle of the props, shape (3,), metres.
     """
-    rng = furnisher.rng
+    rng = builder.rng
     top, width, depth = rng.uniform([0.4, 1.2, 0.8], [0.9, 2.6, 1.6])
     slab = meshes.box([width, depth, 0.04], cell=0.06)
-    furnisher.add(slab.moved([0, 0, top - 0.04]), large=bool(rng.random() < 0.7))
+    builder.add(slab.moved([0, 0, top - 0.04]), large=bool(rng.random() < 0.7))
     for x in (-0.45 * width, 0.45 * width):
         leg = meshes.box([0.08, depth * 0.9, top - 0.05])
-        furnisher.add(leg.moved([x, 0, 0]))
-    _add_backdrop(furnisher, depth / 2 + rng.uniform(0.0, 0.5), top)
+        builder.add(leg.moved([x, 0, 0]))
+    _add_backdrop(builder, depth / 2 + rng.uniform(0.0, 0.5), top)
     for _ in range(int(rng.integers(0, 5))):
         x, y = rng.uniform([-0.6 * width, depth / 2 + 0.2], [0.6 * width, depth + 0.5])
         thing = _any(rng, _BEHIND_TABLES)
-        furnisher.add(thing.moved([x, y, 0], _any_turn(rng)))
+        builder.add(thing.moved([x, y, 0], _any_turn(rng)))
     for _ in range(int(rng.integers(8, 36))):
         x, y = rng.uniform(-0.5, 0.5, 2) * [width * 0.85, depth * 0.9]
         raised = rng.uniform(0, 0.3) if rng.random() < 0.08 else 0.0
         prop, turn = _prop(rng)
-        furnisher.add(prop.moved([x, y, top + raised], turn))
+        builder.add(prop.moved([x, y, top + raised], turn))
     y, z = rng.uniform([-0.1 * depth, top + 0.05], [0.2 * depth, top + 0.25])
     return np.array([0.0, y, z])
 
@@ -108,8 +108,8 @@ def _prop(rng: Rng) -> tuple[Mesh, Matrix]:
     return thing, meshes.turn_z(rng.normal(0, 0.5)) if frontal else _any_turn(rng)
 
 
-def _add_backdrop(furnisher: Furnisher, behind: float, top: float) -> None:
-    rng = furnisher.rng
+def _add_backdrop(builder: SceneBuilder, behind: float, top: float) -> None:
+    rng = builder.rng
     kind = rng.random()
     if kind < 0.5:
         lean = rng.normal(0, 0.15)
@@ -117,23 +117,25 @@ def _add_backdrop(furnisher: Furnisher, behind: float, top: float) -> None:
         turn = np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
         turn = meshes.turn_z(rng.normal(0, 0.2)) @ turn
         board = meshes.box(rng.uniform([0.8, 0.02, 0.5], [2.5, 0.03, 1.3]), 0.12)
-        furnisher.add(board.moved([rng.normal(0, 0.2), behind, top], turn), large=True)
+        builder.add(board.moved([rng.normal(0, 0.2), behind, top], turn), large=True)
     elif kind < 0.75:
         curtain = thin_objects.curtain(rng)
         place = [rng.normal(0, 0.3), behind, top * 0.5]
-        furnisher.add(curtain.moved(place), large=True)
+        builder.add(curtain.moved(place), large=True)
 
 
-def hang_things(furnisher: Furnisher, focus: Matrix, low: Matrix, high: Matrix) -> None:
+def hang_things(
+    builder: SceneBuilder, focus: Matrix, low: Matrix, high: Matrix
+) -> None:
     """Put things in the air, in some scenes: depth there knows no floor.
 
     Args:
-        furnisher: Takes them.
+        builder: Takes them.
         focus: Where they are about, shape (3,), metres.
         low: Lower corner of the room, shape (3,), metres.
         high: Upper corner.
     """
-    rng = furnisher.rng
+    rng = builder.rng
     count = int(rng.integers(1, 9)) if rng.random() < 0.4 else 0
     for _ in range(count):
         thing = _any(rng, THIN if rng.random() < 0.5 else SMALL)
@@ -142,4 +144,4 @@ def hang_things(furnisher: Furnisher, focus: Matrix, low: Matrix, high: Matrix) 
         place = focus + rng.normal(0, 1, 3) * [0.6, 0.4, 0.5]
         place[1] = max(place[1], focus[1] - 0.3)
         place[2] = np.clip(place[2], 0.05, free)
-        furnisher.add(thing.moved(np.clip(place, low + 0.2, high - 0.2)))
+        builder.add(thing.moved(np.clip(place, low + 0.2, high - 0.2)))

@@ -9,7 +9,7 @@ from resdepth_colmap.scene import Matrix
 from resdepth_colmap.synthetic import meshes
 from resdepth_colmap.synthetic.layout import fill_room, hang_things, lay_table
 from resdepth_colmap.synthetic.meshes import Mesh, Rng
-from resdepth_colmap.synthetic.scene_builder import Furnisher, Material
+from resdepth_colmap.synthetic.scene_builder import Material, SceneBuilder
 from resdepth_colmap.synthetic.textures import Picture
 from resdepth_colmap.synthetic.walls import add_shell, dress_walls
 
@@ -66,20 +66,20 @@ def furnish(rng: Rng, style: Style, width_px: int) -> Room:
         width_px: Width of the pictures to be made: textures are as fine as they need.
     """
     texels = 2 ** round(np.clip(np.log2(0.8 * width_px), 6, 10))
-    furnisher = Furnisher(rng, texels)
+    builder = SceneBuilder(rng, texels)
     size = rng.uniform([3.0, 3.5, 2.3], [6.0, 7.0, 3.2])
     low, high = size * [-0.5, -0.5, 0], size * [0.5, 0.5, 1]
-    add_shell(furnisher, low, high)
-    dress_walls(furnisher, high)
+    add_shell(builder, low, high)
+    dress_walls(builder, high)
     if style is Style.TABLE:
-        focus = lay_table(furnisher)
+        focus = lay_table(builder)
     else:
-        focus = fill_room(furnisher, low, high)
-    hang_things(furnisher, focus, low, high)
+        focus = fill_room(builder, low, high)
+    hang_things(builder, focus, low, high)
     return Room(
-        mesh=meshes.merge(furnisher.parts),
-        materials=furnisher.materials,
-        textures=furnisher.textures,
+        mesh=meshes.merge(builder.parts),
+        materials=builder.materials,
+        textures=builder.textures,
         lights=_lights(rng, low, high),
         ambient=rng.uniform(0.1, 0.6) * _warmth(rng),
         focus=focus,

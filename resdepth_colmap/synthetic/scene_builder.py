@@ -33,7 +33,7 @@ class Material:
     emission: float = 0.0
 
 
-class Furnisher:
+class SceneBuilder:
     """Collects meshes and gives their slots materials.
 
     How much of a scene has no texture differs from scene to scene: about a third of

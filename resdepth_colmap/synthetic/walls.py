@@ -7,7 +7,7 @@ import numpy as np
 from resdepth_colmap.scene import Matrix
 from resdepth_colmap.synthetic import meshes, objects, thin_objects
 from resdepth_colmap.synthetic.meshes import Mesh, Rng
-from resdepth_colmap.synthetic.scene_builder import Furnisher
+from resdepth_colmap.synthetic.scene_builder import SceneBuilder
 
 _CELL = 0.15  # metres between points where light is baked
 _UP = np.array([0.0, 0.0, 1.0])
@@ -24,22 +24,22 @@ _ON_WALLS: tuple[objects.Builder, ...] = (
 )
 
 
-def add_shell(furnisher: Furnisher, low: Matrix, high: Matrix) -> None:
+def add_shell(builder: SceneBuilder, low: Matrix, high: Matrix) -> None:
     """Floor, ceiling and four walls between two corners (3,), in metres."""
-    rng = furnisher.rng
+    rng = builder.rng
     x, y, z = np.diag(high - low)
-    furnisher.add(meshes.rectangle(low, x, y, _CELL), large=True)
-    furnisher.add(meshes.rectangle(low + z, x, y, 2 * _CELL), large=True)
-    paint = furnisher.surface(large=True)
+    builder.add(meshes.rectangle(low, x, y, _CELL), large=True)
+    builder.add(meshes.rectangle(low + z, x, y, 2 * _CELL), large=True)
+    paint = builder.surface(large=True)
     for corner, along in ((low, x), (low + y, x), (low, y), (low + x, y)):
         inward = np.sign(-corner - along / 2) * (along == 0) * [1, 1, 0]
         wall = _wall(rng, corner, along, z, inward)
-        slots = [furnisher.surface(large=True) for _ in range(wall.num_slots)]
+        slots = [builder.surface(large=True) for _ in range(wall.num_slots)]
         if rng.random() < 0.65:
             slots[0] = paint
         if wall.num_slots > 2 and rng.random() < 0.4:  # a window by day
-            slots[1] = furnisher.surface(large=True, emission=rng.uniform(0.5, 3))
-        furnisher.add_with(wall, slots)
+            slots[1] = builder.surface(large=True, emission=rng.uniform(0.5, 3))
+        builder.add_with(wall, slots)
 
 
 def _wall(rng: Rng, corner: Matrix, along: Matrix, up: Matrix, inward: Matrix) -> Mesh:
@@ -93,14 +93,14 @@ def _panel(
     return dataclasses.replace(panel, uv=panel.uv + np.array([u0, v0]))
 
 
-def dress_walls(furnisher: Furnisher, high: Matrix) -> None:
+def dress_walls(builder: SceneBuilder, high: Matrix) -> None:
     """Pictures, shelves, curtains and pipes; half of them on the wall at +y.
 
     Args:
-        furnisher: Takes them.
+        builder: Takes them.
         high: Upper corner of the room, shape (3,), metres; the lower one mirrors it.
     """
-    rng = furnisher.rng
+    rng = builder.rng
     for _ in range(int(rng.integers(2, 12))):
         thing = _ON_WALLS[rng.integers(len(_ON_WALLS))](rng)
         free = max(float(high[2] - thing.size[2]), 0.0)
@@ -110,4 +110,4 @@ def dress_walls(furnisher: Furnisher, high: Matrix) -> None:
         hung = thing.moved(
             [rng.uniform(-0.8, 0.8) * across, depth, free * rng.random()]
         )
-        furnisher.add(hung.moved([0, 0, 0], meshes.turn_z(quarter * np.pi / 2)))
+        builder.add(hung.moved([0, 0, 0], meshes.turn_z(quarter * np.pi / 2)))

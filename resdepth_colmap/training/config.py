@@ -5,7 +5,7 @@ import enum
 from pathlib import Path
 from typing import Any, Self
 
-from resdepth_colmap.config import Config, Device
+from resdepth_colmap.config import Config, Device, option
 
 
 class Preset(enum.StrEnum):
@@ -74,9 +74,8 @@ class TrainConfig(Config):
         freeze_unet: Train the propagation alone: the U-Net stays as it begins.
         freeze_norms: Keep the running statistics of the norms, and normalise by them
             instead of by those of each batch: a gentler way to go on from good weights.
-        rounds: Learn so many rounds: from 2 on, part of the crops are compared with the
-            maps of other views after the weights to start from have refined these, once
-            or more often.
+        outer_iterations: Outer iterations to learn: from 2 on, part of the crops are
+            compared with maps of other views that the initial weights have refined.
         samples: Folder of prepared samples, which several trainings may share; None =
             one in the output folder.
     """
@@ -107,7 +106,7 @@ class TrainConfig(Config):
     init: Path | None = None
     freeze_unet: bool = False
     freeze_norms: bool = False
-    rounds: int = 1
+    outer_iterations: int = option("rounds", 1)
     samples: Path | None = None
 
     def __post_init__(self) -> None:
@@ -170,7 +169,7 @@ _AT_LEAST_ONE = (
     "validation_steps",
     "validation_views",
     "loaders",
-    "rounds",
+    "outer_iterations",
 )
 _NOT_NEGATIVE = (
     "distance_power",

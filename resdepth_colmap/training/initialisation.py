@@ -22,7 +22,7 @@ _MORE = (
     "source_depth",
     "color",
     "propagation_channels",
-    "second_look",
+    "source_resampling",
     "shared_features",
 )
 """What a network may have that the weights to start from have not, or have less of."""
@@ -76,10 +76,13 @@ def fresh_network(network_config: NetworkConfig, config: TrainConfig) -> ResDept
     """
     torch.manual_seed(config.seed)
     network = ResDepthNet(network_config)
-    if config.rounds > 1 and (config.init is None or not network_config.source_depth):
+    if config.outer_iterations > 1 and (
+        config.init is None or not network_config.source_depth
+    ):
         raise ConfigError(
-            f"{config.rounds=}: there is no network that could do the first round, or "
-            "none that looks at its result; add init and source_depth, or leave it out."
+            f"rounds={config.outer_iterations}: no network could do the first outer "
+            "iteration, or none sees its maps; add init and source_depth, or leave it "
+            "out."
         )
     if config.freeze_unet and network.propagation is None:
         raise ConfigError(

@@ -8,7 +8,7 @@ from torch import Tensor, nn
 from torch.nn.parallel import DistributedDataParallel
 
 from resdepth_colmap.errors import TrainingError
-from resdepth_colmap.network.unet import Look, Refinement, ResDepthNet
+from resdepth_colmap.network.unet import Refinement, ResDepthNet, SampleSource
 from resdepth_colmap.training.config import (
     Optimiser,
     Precision,
@@ -95,7 +95,9 @@ class Optimisation:
         _freeze(self.network, self.config)
         batch = batch.to(self.ranks.device)
         inputs = batch.inputs.contiguous(memory_format=torch.channels_last)
-        loss = refinement_loss(self._refined(inputs, batch.look), batch, self.config)
+        loss = refinement_loss(
+            self._refined(inputs, batch.sample_source), batch, self.config
+        )
         total, num_known, num_stops = self.ranks.summed(
             [float(loss.total.detach()), float(loss.num_known), float(wants_stop)]
         )
@@ -112,11 +114,11 @@ class Optimisation:
         self.schedule.step()
         return value, num_stops > 0
 
-    def _refined(self, inputs: Tensor, look: Look) -> Refinement:
+    def _refined(self, inputs: Tensor, sample_source: SampleSource) -> Refinement:
         """The network's output in single precision, whatever it computed with."""
         halved = self.config.precision is Precision.BFLOAT16
         with torch.autocast(inputs.device.type, torch.bfloat16, enabled=halved):
-            inverse_depth, log_scale = self.model(inputs, look)
+            inverse_depth, log_scale = self.model(inputs, sample_source)
         return Refinement(
             inverse_depth.float(), None if log_scale is None else log_scale.float()
         )

@@ -24,7 +24,7 @@ NUM_BATCHES = 8
 NUM_PICTURES = 2
 
 # The network by itself: no rule after it hides what it does to good pixels.
-_REFINING = RefineConfig(passes=1, keep_confirmed=False)
+_REFINING = RefineConfig(inner_iterations=1, update_gating=False)
 _OFF = 0.02
 
 
@@ -115,7 +115,9 @@ def mean_loss(network: ResDepthNet, sampler: CropSampler, config: TrainConfig) -
     total, num_known = 0.0, 0.0
     for index in range(NUM_BATCHES):
         batch = sampler.batch(index).to(device)
-        loss = refinement_loss(network(batch.inputs, batch.look), batch, config)
+        loss = refinement_loss(
+            network(batch.inputs, batch.sample_source), batch, config
+        )
         total += float(loss.total)
         num_known += float(loss.num_known)
     return total / max(num_known, 1.0)

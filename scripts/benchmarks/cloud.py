@@ -140,12 +140,12 @@ def main() -> None:
     parser.add_argument("--data", type=Path, default=DATA, help="the real data")
     parser.add_argument("--output", type=Path, default=RESULT)
     arguments = parser.parse_args()
-    cases = sorted((arguments.data / "eth3d_cloud_cases").iterdir())
+    samples = sorted((arguments.data / "eth3d_cloud_cases").iterdir())
     measured = {
         "command": "python -m scripts.benchmarks.cloud",
         "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
         "versions": versions(),
-        "cases": {folder.name: compared(folder) for folder in cases},
+        "samples": {folder.name: compared(folder) for folder in samples},
         "sizes": [timed(num_points) for num_points in SIZES],
     }
     arguments.output.parent.mkdir(parents=True, exist_ok=True)

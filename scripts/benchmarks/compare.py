@@ -119,8 +119,8 @@ def main() -> None:
     parser.add_argument("--data", type=Path, default=DATA, help="the real data")
     parser.add_argument("--output", type=Path, default=CACHE, help="of the workspaces")
     parser.add_argument("--result", type=Path, default=RESULT, help="of the figures")
-    cases = [*REAL, *ROOMS]
-    parser.add_argument("--only", nargs="*", choices=cases, default=cases)
+    samples = [*REAL, *ROOMS]
+    parser.add_argument("--only", nargs="*", choices=samples, default=samples)
     parser.add_argument("--weights", type=Path)
     parser.add_argument("--width", type=int, default=640)
     parser.add_argument("--height", type=int, default=480)

@@ -31,11 +31,11 @@ def main() -> None:
     parser.add_argument(
         "--weights", type=Path, help="those of the package, if not given"
     )
-    parser.add_argument("--passes", type=int, default=RefineConfig.passes)
+    parser.add_argument("--passes", type=int, default=RefineConfig.inner_iterations)
     arguments = parser.parse_args()
     logging.basicConfig(level=logging.INFO, format="%(message)s")
     cache = MatchCache(folder=arguments.cache or arguments.output / "matched")
-    config = RefineConfig(weights=arguments.weights, passes=arguments.passes)
+    config = RefineConfig(weights=arguments.weights, inner_iterations=arguments.passes)
     for path in arguments.scenes or SCENES:
         for scene in scenes_at(path):
             for strip in scene_strips(scene, arguments.output, cache, config):

@@ -62,7 +62,7 @@ def measure(
         "height_px": height_px,
         "megapixels": round(megapixels, 3),
         "seconds": seconds[1:],
-        "s_per_mp_and_pass": round(median_s / megapixels / config.passes, 3),
+        "s_per_mp_and_pass": round(median_s / megapixels / config.inner_iterations, 3),
     }
 
 
@@ -70,22 +70,27 @@ def main() -> None:
     """Read the command line, measure size by size, print and write."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--weights", type=Path)
-    parser.add_argument("--passes", type=int, default=RefineConfig.passes)
+    parser.add_argument("--passes", type=int, default=RefineConfig.inner_iterations)
     parser.add_argument("--output", type=Path, default=RESULT)
     arguments = parser.parse_args()
     torch.set_num_threads(NUM_THREADS)
-    config = RefineConfig(passes=arguments.passes, weights=arguments.weights)
+    config = RefineConfig(inner_iterations=arguments.passes, weights=arguments.weights)
     network = for_inference(load_weights(config.weights))
     measured = {
         "command": "python -m scripts.benchmarks.refine",
         "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
         "weights_sha256": weights_hash(config.weights),
-        "options": {"passes": config.passes, "threads": NUM_THREADS},
+        "options": {
+            "inner_iterations": config.inner_iterations,
+            "threads": NUM_THREADS,
+        },
         "versions": versions(),
         "sizes": [measure(*size, network, config) for size in SIZES_PX],
     }
-    if config.passes != RefineConfig.passes:
-        measured["command"] = f"{measured['command']} --passes {config.passes}"
+    if config.inner_iterations != RefineConfig.inner_iterations:
+        measured["command"] = (
+            f"{measured['command']} --passes {config.inner_iterations}"
+        )
     arguments.output.parent.mkdir(parents=True, exist_ok=True)
     arguments.output.write_text(json.dumps(measured, indent=2) + "\n", "utf-8")
     print(refine_table(measured))

@@ -10,10 +10,10 @@ import numpy as np
 
 from resdepth_colmap.config import RefineConfig, StereoBackend, StereoConfig
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.evaluation.datasets.sample import CaseOptions
+from resdepth_colmap.evaluation.datasets.sample import SampleOptions
 from resdepth_colmap.evaluation.datasets.workspaces import (
     TRUTH_FOLDER,
-    read_workspace_cases,
+    read_workspace_samples,
 )
 from resdepth_colmap.evaluation.depth.match_cache import MatchCache
 from resdepth_colmap.evaluation.depth.sample_matching import initial_depth
@@ -116,12 +116,12 @@ def _match(scene: Path, copy: MatchedWorkspace, cache: MatchCache) -> None:
             "`resdepth-colmap stereo --no-filter`."
         )
     stereo = StereoConfig()
-    options = CaseOptions(stereo=stereo, num_sources=1)
-    for read_case in read_workspace_cases(scene, options):
-        case = read_case()
-        found = initial_depth(scene.name, case, StereoBackend.CPU, stereo, cache)
-        _write(copy, case.name, MATCHED, found.depth)
-        for source, depth in zip(case.sources, found.source_depths, strict=False):
+    options = SampleOptions(stereo=stereo, num_sources=1)
+    for read_sample in read_workspace_samples(scene, options):
+        sample = read_sample()
+        found = initial_depth(scene.name, sample, StereoBackend.CPU, stereo, cache)
+        _write(copy, sample.name, MATCHED, found.depth)
+        for source, depth in zip(sample.sources, found.source_depths, strict=False):
             if depth is not None:
                 _write(copy, _name_of(source, copy.scene), SOURCE, depth)
 

@@ -13,13 +13,13 @@ MEASURES = ("mae", "rmse", "medae", "bad_2")
 RATIOS = ("mae", "medae")
 INITIAL, MEDIAN = "unfiltered", "median"
 
-ArmErrors = dict[str, dict[str, float]]
+MethodErrors = dict[str, dict[str, float]]
 """By arm, then by measure."""
 
 
-def arm_errors(
+def method_errors(
     initial: DepthMap, refined: Mapping[str, DepthMap], truth: DepthMap
-) -> ArmErrors:
+) -> MethodErrors:
     """Errors of one view: of the initial map, of its 5 x 5 median, of each network's.
 
     Args:
@@ -35,7 +35,7 @@ def arm_errors(
     return errors
 
 
-def arm_summaries(views: Mapping[str, ArmErrors]) -> dict[str, dict[str, Any]]:
+def method_summaries(views: Mapping[str, MethodErrors]) -> dict[str, dict[str, Any]]:
     """Means over the views: of each error, and of its ratio to that of the initial map.
 
     Args:
@@ -45,25 +45,26 @@ def arm_summaries(views: Mapping[str, ArmErrors]) -> dict[str, dict[str, Any]]:
     Returns:
         By arm: the means, the ratios `<measure>_ratio`, and each view's MAE.
     """
-    arms = next(iter(views.values()), {})
-    return {arm: _summary(arm, views) for arm in arms}
+    methods = next(iter(views.values()), {})
+    return {method: _summary(method, views) for method in methods}
 
 
-def _summary(arm: str, views: Mapping[str, ArmErrors]) -> dict[str, Any]:
+def _summary(method: str, views: Mapping[str, MethodErrors]) -> dict[str, Any]:
     means = {
-        key: _mean([errors[arm][key] for errors in views.values()]) for key in MEASURES
+        key: _mean([errors[method][key] for errors in views.values()])
+        for key in MEASURES
     }
     ratios = {
         f"{key}_ratio": _mean(
             [
-                errors[arm][key] / errors[INITIAL][key]
+                errors[method][key] / errors[INITIAL][key]
                 for errors in views.values()
                 if errors[INITIAL][key]
             ]
         )
         for key in RATIOS
     }
-    maes = {name: errors[arm]["mae"] for name, errors in views.items()}
+    maes = {name: errors[method]["mae"] for name, errors in views.items()}
     return {**means, **ratios, "views": maes}
 
 

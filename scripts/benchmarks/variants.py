@@ -53,7 +53,7 @@ from resdepth_colmap.versions import versions
 from scripts.benchmarks.matching.matched_workspace import linked_maps, matched_workspace
 from scripts.benchmarks.tables.documents import HARDWARE
 from scripts.benchmarks.tables.variants import beyond_table, variants_table
-from scripts.benchmarks.variant_errors import arm_errors, arm_summaries
+from scripts.benchmarks.variant_errors import method_errors, method_summaries
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 RESULTS = REPOSITORY / "docs" / "measurements"
@@ -61,7 +61,7 @@ STEREO, ITERATED = "resdepth_stereo", "resdepth_stereo_iter"
 REFINED_KIND = "refined"
 
 # The networks by themselves.
-REFINING = RefineConfig(passes=1, keep_confirmed=False)
+REFINING = RefineConfig(inner_iterations=1, update_gating=False)
 
 
 class Options(NamedTuple):
@@ -153,14 +153,14 @@ def refined_copies(
             path = copy.workspace.depth_map_path(view.image_name, REFINED_KIND)
             loaded = None if path.exists() else view.load(network.config.num_sources)
             if loaded is not None:
-                write_depth_map(path, Arm([network]).refined(loaded.inputs))
+                write_depth_map(path, Method([network]).refined(loaded.inputs))
             elif not path.exists():  # of a failed pair: no training takes it
                 link_or_copy(view.map_path, path)
         copies.append(copy.path)
     return copies
 
 
-class Arm(NamedTuple):
+class Method(NamedTuple):
     """Networks that are applied one after the other."""
 
     networks: Sequence[ResDepthNet]
@@ -173,55 +173,58 @@ class Arm(NamedTuple):
         return view.depth
 
 
-Arms = dict[str, Arm]
+Methods = dict[str, Method]
 
 
-def measure(scenes: Sequence[Path], arms: Arms) -> dict[str, Any]:
+def measure(scenes: Sequence[Path], methods: Methods) -> dict[str, Any]:
     """Errors of each arm on each view, and their means."""
     errors = {}
     for view in (view for scene in scenes for view in labelled_views(scene)):
         loaded = view.load(num_sources=1)
         if loaded is None:
             continue
-        refined = {key: arm.refined(loaded.inputs) for key, arm in arms.items()}
-        errors[view.name] = arm_errors(loaded.inputs.depth, refined, loaded.truth)
+        refined = {
+            key: method.refined(loaded.inputs) for key, method in methods.items()
+        }
+        errors[view.name] = method_errors(loaded.inputs.depth, refined, loaded.truth)
     return {
         "num_scenes": len(scenes),
         "num_views": len(errors),
-        "arms": arm_summaries(errors),
+        "methods": method_summaries(errors),
     }
 
 
-def paper_arms(trainer: Trainer) -> Arms:
+def paper_methods(trainer: Trainer) -> Methods:
     """The paper's variants."""
     suffix = trainer.budget.network.normalisation
-    arms = {
-        name: Arm([trainer.network(f"{name}-{suffix}", PAPER[name])]) for name in PAPER
+    methods = {
+        name: Method([trainer.network(f"{name}-{suffix}", PAPER[name])])
+        for name in PAPER
     }
-    (stereo,) = arms[STEREO].networks
+    (stereo,) = methods[STEREO].networks
     folder = trainer.work / f"refined_scenes-{suffix}"
     trainer = trainer._replace(scenes=refined_copies(trainer.scenes, stereo, folder))
     again = trainer.network(f"{ITERATED}-{suffix}", PAPER[STEREO])
-    return {**arms, ITERATED: Arm([stereo, again])}
+    return {**methods, ITERATED: Method([stereo, again])}
 
 
-def beyond_arms(trainer: Trainer) -> Arms:
+def beyond_methods(trainer: Trainer) -> Methods:
     """ResDepth-stereo, what is added to it; what two passes add then."""
-    arms: Arms = {}
+    methods: Methods = {}
     options = Options()
     for name, more in ADDITIONS.items():
         options = Options(
             {**options.network, **more.network}, {**options.training, **more.training}
         )
         network = trainer.network(FOLDERS.get(name, name), options)
-        arms[name] = Arm([network])
-    arms["two_passes"] = Arm([network, network])
-    return arms
+        methods[name] = Method([network])
+    methods["two_passes"] = Method([network, network])
+    return methods
 
 
 PARTS = {
-    "variants": (paper_arms, variants_table, Normalisation.ROBUST),
-    "beyond": (beyond_arms, beyond_table, Normalisation.BASELINE),
+    "variants": (paper_methods, variants_table, Normalisation.ROBUST),
+    "beyond": (beyond_methods, beyond_table, Normalisation.BASELINE),
 }
 
 
@@ -280,10 +283,10 @@ def main() -> None:
     }
     arguments.output.mkdir(parents=True, exist_ok=True)
     for part in arguments.parts:
-        make_arms, table, normalisation = PARTS[part]
+        make_methods, table, normalisation = PARTS[part]
         network = dataclasses.replace(budget.network, normalisation=normalisation)
         budget = budget._replace(network=network)
-        arms = make_arms(Trainer(split.training, work, budget))
+        methods = make_methods(Trainer(split.training, work, budget))
         measured = {
             "command": "python -m scripts.benchmarks.variants",
             "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
@@ -293,7 +296,9 @@ def main() -> None:
             "steps": arguments.steps,
             "network": budget.network.to_mapping(),
             "training": {**budget.training.to_mapping(), "samples": None},
-            "sets": {key: measure(paths, arms) for key, paths in sets.items() if paths},
+            "sets": {
+                key: measure(paths, methods) for key, paths in sets.items() if paths
+            },
         }
         text = json.dumps(measured, indent=2) + "\n"
         (arguments.output / f"{part}.json").write_text(text, "utf-8")

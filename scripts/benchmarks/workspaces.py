@@ -22,7 +22,7 @@ from typing import Any
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 RESULT = REPOSITORY / "docs" / "measurements" / "workspaces.json"
-CASES: dict[str, tuple[str, list[str]]] = {
+SAMPLES: dict[str, tuple[str, list[str]]] = {
     "meeting_room": ("meeting_room", []),
     "plant-photometric": ("plant", ["--input", "photometric"]),
     "plant-geometric": ("plant", ["--input", "geometric"]),
@@ -48,9 +48,9 @@ def reconstruct(photos: Path, workspace: Path) -> float:
     return time.perf_counter() - start
 
 
-def prepare(case: str, data: Path, output: Path) -> tuple[Path, float]:
+def prepare(sample: str, data: Path, output: Path) -> tuple[Path, float]:
     """A fresh copy of the workspace, and the seconds of structure from motion."""
-    source, target = data / CASES[case][0], output / case
+    source, target = data / SAMPLES[sample][0], output / sample
     shutil.rmtree(target, ignore_errors=True)
     if (source / "sparse").is_dir():
         shutil.copytree(source, target)
@@ -59,12 +59,12 @@ def prepare(case: str, data: Path, output: Path) -> tuple[Path, float]:
 
 
 def measure(
-    case: str, data: Path, output: Path, before: dict[str, Any] | None
+    sample: str, data: Path, output: Path, before: dict[str, Any] | None
 ) -> dict[str, Any]:
     """Run the command on the case and collect what its record says.
 
     Args:
-        case: Which one.
+        sample: Which one.
         data: Folder of the real data.
         output: Folder of the copies.
         before: Figures of an earlier run, whose copy is there: its matched maps and
@@ -72,15 +72,15 @@ def measure(
     """
     extra = []
     if before is None:
-        workspace, sfm_s = prepare(case, data, output)
+        workspace, sfm_s = prepare(sample, data, output)
     else:
-        workspace = output / case / ("dense" if "castle" in case else "")
+        workspace = output / sample / ("dense" if "castle" in sample else "")
         sfm_s = before["seconds"]["structure_from_motion"]
         extra = ["--overwrite"]
     program = Path(sys.executable).parent / "resdepth-colmap"
     command = [str(program), "refine", str(workspace)]
     start = time.perf_counter()
-    subprocess.run([*command, *CASES[case][1], *extra], check=True)
+    subprocess.run([*command, *SAMPLES[sample][1], *extra], check=True)
     wall_s = time.perf_counter() - start
     record = json.loads((workspace / "resdepth" / "run.json").read_text("utf-8"))
     images = record["images"].values()
@@ -90,7 +90,7 @@ def measure(
         record["seconds"]["stereo"] = kept_s
     return {
         "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
-        "options": CASES[case][1],
+        "options": SAMPLES[sample][1],
         "num_images": len(images),
         "seconds": {"structure_from_motion": round(sfm_s, 1), **record["seconds"]},
         "seconds_in_all": round(wall_s, 1),
@@ -114,18 +114,20 @@ def main() -> None:
         "--data", type=Path, default=os.environ.get("RESDEPTH_DATA", default)
     )
     parser.add_argument("--output", type=Path, default=REPOSITORY / "build" / "bench")
-    parser.add_argument("--only", nargs="*", choices=CASES, default=list(CASES))
+    parser.add_argument("--only", nargs="*", choices=SAMPLES, default=list(SAMPLES))
     parser.add_argument(
         "--keep-maps", action="store_true", help="match nothing again; see measure()"
     )
     arguments = parser.parse_args()
-    for case in arguments.only:
+    for sample in arguments.only:
         results = json.loads(RESULT.read_text("utf-8")) if RESULT.exists() else {}
-        before = results[case] if arguments.keep_maps else None
-        results[case] = measure(case, Path(arguments.data), arguments.output, before)
+        before = results[sample] if arguments.keep_maps else None
+        results[sample] = measure(
+            sample, Path(arguments.data), arguments.output, before
+        )
         RESULT.parent.mkdir(parents=True, exist_ok=True)
         RESULT.write_text(json.dumps(results, indent=2) + "\n", "utf-8")
-        print(case, json.dumps(results[case]))
+        print(sample, json.dumps(results[sample]))
 
 
 if __name__ == "__main__":

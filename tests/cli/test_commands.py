@@ -63,7 +63,7 @@ def test_the_record_of_a_run_says_what_was_done_with_what(tmp_path: Path) -> Non
     folder = plane_folder(tmp_path)
     refine(folder, "--passes", 2, "--min-num-views", 2, "--no-pictures")
     record = json.loads((folder / "resdepth/run.json").read_text(encoding="utf-8"))
-    assert record["options"]["refine"]["passes"] == 2
+    assert record["options"]["refine"]["inner_iterations"] == 2
     assert record["options"]["fuse"]["min_num_views"] == 2
     assert set(record["versions"]) >= {"torch", "pycolmap", "open3d", "numpy"}
     assert len(record["weights_sha256"]) == 64

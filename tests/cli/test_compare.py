@@ -80,7 +80,7 @@ def test_wrong_depth_is_seen_by_every_measure_but_coverage(tmp_path: Path) -> No
 def test_the_same_maps_in_two_arms_do_not_differ(tmp_path: Path) -> None:
     scene = compared_workspace(tmp_path / "scene", unfiltered=exact, filtered=None)
     found = measured(scene)
-    assert found["arms"]["unfiltered"]["kind"] == "photometric"
+    assert found["methods"]["unfiltered"]["kind"] == "photometric"
     for paired in found["paired"]["refined - unfiltered"].values():
         assert paired["views"]["num_pairs"] == 5
         assert paired["views"]["mean"] == paired["views"]["median"] == 0
@@ -124,10 +124,10 @@ def test_tolerances_are_in_units_of_the_workspace(tmp_path: Path) -> None:
 def test_the_kinds_of_the_arms_can_be_given(tmp_path: Path) -> None:
     scene = compared_workspace(tmp_path / "scene", unfiltered=with_hole)
     found = measured(scene)
-    assert set(found["arms"]) == {"filtered", "refined"}
-    assert found["arms"]["filtered"]["kind"] == "geometric"
+    assert set(found["methods"]) == {"filtered", "refined"}
+    assert found["methods"]["filtered"]["kind"] == "geometric"
     found = measured(scene, "--unfiltered", "photometric")
-    assert found["arms"]["unfiltered"]["kind"] == "photometric"
+    assert found["methods"]["unfiltered"]["kind"] == "photometric"
     result = compare(scene, "--filtered", "other", exit_code=1)
     assert "no other map" in result.stderr
     assert "geometric, photometric" in result.stderr
@@ -137,7 +137,9 @@ def test_without_truth_no_score_and_no_accuracy_is_claimed(tmp_path: Path) -> No
     scene = compared_workspace(tmp_path / "scene", truth=None)
     found = measured(scene)
     assert found["truth"] is None
-    assert all(arm["scores"] is None for arm in found["clouds"]["open3d"].values())
+    assert all(
+        method["scores"] is None for method in found["clouds"]["open3d"].values()
+    )
     assert found["measures"]["refined"]["right_1"] is None
     assert found["measures"]["refined"]["points_odd"] == 1
     assert found["measures"]["unfiltered"]["points_odd"] < 0.8

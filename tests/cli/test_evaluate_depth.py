@@ -42,15 +42,15 @@ def test_the_json_is_what_the_tables_of_the_documents_are_made_of(
 ) -> None:
     write_stereo_pair(tmp_path / "One")
     output, cache = tmp_path / "depth.json", tmp_path / "cache"
-    options = ("--json", "--passes", 2, "--no-keep-confirmed", "--cache", cache)
+    options = ("--json", "--passes", 2, "--no-update-gating", "--cache", cache)
     result = evaluate(tmp_path, tmp_path / "One", "--output", output, *options)
     measured = json.loads(result.stdout)
     assert measured == json.loads(output.read_text())
     assert measured["command"] == (
-        "resdepth-colmap evaluate depth One --passes 2 --no-keep-confirmed --weights "
+        "resdepth-colmap evaluate depth One --passes 2 --no-update-gating --weights "
         f"{identity_weights(tmp_path).name} --window-radius 3 --num-iterations 2"
     )
-    assert measured["options"]["refine"]["keep_confirmed"] is False
+    assert measured["options"]["refine"]["update_gating"] is False
     assert measured["options"]["max_residual"] == PAPER_MAX_RESIDUAL
     assert "| One | refined |" in middlebury_table(measured)
     assert len(list(cache.iterdir())) == 1

@@ -17,7 +17,7 @@ from workspaces import identity_weights
 from resdepth_colmap.cli.main import main
 from resdepth_colmap.config import StereoBackend, StereoConfig
 from resdepth_colmap.evaluation.datasets.eth3d import Eth3dOptions, eth3d_sources
-from resdepth_colmap.evaluation.datasets.sample import CaseOptions
+from resdepth_colmap.evaluation.datasets.sample import SampleOptions
 from resdepth_colmap.evaluation.depth.match_cache import MatchCache, Matching
 from resdepth_colmap.evaluation.depth.sample_matching import cache_name
 
@@ -49,16 +49,16 @@ def measured(result: Result) -> dict:  # type: ignore[type-arg] # JSON
 def fill_cache(folder: Path, rendered: RenderedEth3d) -> None:
     """As if a matcher had found the exact depth of every pair."""
     options = Eth3dOptions(image_width_px=WIDTH_PX)
-    wanted = CaseOptions(stereo=STEREO, num_sources=1)
+    wanted = SampleOptions(stereo=STEREO, num_sources=1)
     camera = rendered.camera(WIDTH_PX)
     (source,) = eth3d_sources(rendered.path.parent, options)
     for load in source.read(wanted):
-        case = load()
-        index = IMAGES.index(case.name.split()[0])
-        name = cache_name(source.name, case.name, StereoBackend.CPU)
-        views = (case.reference, *case.sources)
+        sample = load()
+        index = IMAGES.index(sample.name.split()[0])
+        name = cache_name(source.name, sample.name, StereoBackend.CPU)
+        views = (sample.reference, *sample.sources)
         matching = Matching(depth=rendered.depth(index, camera), cpu_s=1.0)
-        MatchCache(folder=folder).add(name, views, case.depth_range, STEREO, matching)
+        MatchCache(folder=folder).add(name, views, sample.depth_range, STEREO, matching)
 
 
 def test_depth_that_is_right_scores_nothing_but_the_pixel_grid(
@@ -72,12 +72,12 @@ def test_depth_that_is_right_scores_nothing_but_the_pixel_grid(
     scene = measured(result)["scenes"]["office"]
     exact = rendered.depth(0, rendered.camera(WIDTH_PX))
     reach = maximum_filter(exact, 3) - minimum_filter(exact, 3)
-    for arm in ("unfiltered", "refined"):
-        assert scene[arm]["mae"] < 0.25 * reach.mean()
-        assert scene[arm]["medae"] < 0.25 * np.median(reach)
-        assert scene[arm]["medae"] < 0.004  # of about 4 m
-        assert scene["flat"][arm]["bad_1"] < 0.01
-        assert scene[arm]["num_missing"] == scene[arm]["num_discarded"] == 0
+    for method in ("unfiltered", "refined"):
+        assert scene[method]["mae"] < 0.25 * reach.mean()
+        assert scene[method]["medae"] < 0.25 * np.median(reach)
+        assert scene[method]["medae"] < 0.004  # of about 4 m
+        assert scene["flat"][method]["bad_1"] < 0.01
+        assert scene[method]["num_missing"] == scene[method]["num_discarded"] == 0
     pixels = scene["unfiltered"]["num_pixels"]
     assert pixels == sum(scene[r]["refined"]["num_pixels"] for r in ("edges", "flat"))
     assert pixels > 0.8 * 120 * 80 * scene["num_views"]

@@ -58,7 +58,7 @@ def test_the_help_of_each_command_has_an_example(command: str) -> None:
 def test_defaults_in_the_help_are_those_of_the_configuration() -> None:
     text = " ".join(run("refine", "--help").output.split())
     assert f"[default: {RefineConfig.tile_px}]" in text
-    assert f"[default: {RefineConfig.passes}]" in text
+    assert f"[default: {RefineConfig.inner_iterations}]" in text
 
 
 def test_the_version_is_that_of_the_package() -> None:

@@ -27,25 +27,25 @@ def test_the_wall_goes_on_behind_the_card(along_rows: bool) -> None:
     found = np.where(known, truth, np.float32(9.0))
     if not along_rows:
         truth, known, found = truth.T, known.T, found.T
-    completed = complete_from_background(found, known, along_rows)
-    np.testing.assert_array_equal(completed, truth)
-    assert completed.dtype == np.float32
+    filled_in = complete_from_background(found, known, along_rows)
+    np.testing.assert_array_equal(filled_in, truth)
+    assert filled_in.dtype == np.float32
 
 
 def test_what_lies_at_the_border_takes_what_is_there() -> None:
     truth = card_before_a_wall()
     known = np.ones(SHAPE, bool)
     known[:, :5] = False
-    completed = complete_from_background(truth * known, known, along_rows=True)
-    np.testing.assert_array_equal(completed, truth)
+    filled_in = complete_from_background(truth * known, known, along_rows=True)
+    np.testing.assert_array_equal(filled_in, truth)
 
 
 def test_a_line_without_anything_known_takes_the_median() -> None:
     truth = np.full(SHAPE, 0.25, np.float32)
     known = np.ones(SHAPE, bool)
     known[2:9] = False
-    completed = complete_from_background(truth * known, known, along_rows=True)
-    np.testing.assert_array_equal(completed, truth)
+    filled_in = complete_from_background(truth * known, known, along_rows=True)
+    np.testing.assert_array_equal(filled_in, truth)
 
 
 maps = arrays.arrays(np.float32, SHAPE, elements=st.floats(0.125, 8.0, width=32))
@@ -56,10 +56,10 @@ masks = arrays.arrays(np.bool_, SHAPE)
 def test_known_depths_stay_and_none_is_invented(
     inverse: FloatMap, known: np.ndarray, along_rows: bool
 ) -> None:
-    completed = complete_from_background(inverse, known, along_rows)
-    np.testing.assert_array_equal(completed[known], inverse[known])
+    filled_in = complete_from_background(inverse, known, along_rows)
+    np.testing.assert_array_equal(filled_in[known], inverse[known])
     if known.any():
-        assert completed.min() >= inverse[known].min()
-        assert completed.max() <= inverse[known].max()
+        assert filled_in.min() >= inverse[known].min()
+        assert filled_in.max() <= inverse[known].max()
     else:
-        np.testing.assert_array_equal(completed, inverse)
+        np.testing.assert_array_equal(filled_in, inverse)

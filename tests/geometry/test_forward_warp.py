@@ -14,7 +14,7 @@ from analytic_scene import (
 )
 from torch import Tensor
 
-from resdepth_colmap.geometry.forward_warp import carry_inverse_depth
+from resdepth_colmap.geometry.forward_warp import reproject_inverse_depth
 from resdepth_colmap.scene import Camera
 
 SIZE_PX = (CAMERA.height_px, CAMERA.width_px)
@@ -27,16 +27,18 @@ def source_depth(camera: Camera = CAMERA) -> Tensor:
     ]
 
 
-def carried(pair: Pair, depth_in_source: Tensor) -> Tensor:
+def reprojected(pair: Pair, depth_in_source: Tensor) -> Tensor:
     inverse = torch.where(depth_in_source > 0, 1.0 / depth_in_source, 0.0)
     pose = pair.source_from_reference
-    return carry_inverse_depth(inverse, pair.source_K, pair.reference_K, pose, SIZE_PX)
+    return reproject_inverse_depth(
+        inverse, pair.source_K, pair.reference_K, pose, SIZE_PX
+    )
 
 
 @pytest.mark.parametrize("camera", [CAMERA, LARGER])
 def test_a_plane_arrives_where_it_is_and_closed(camera: Camera) -> None:
     pair = plane_pair(camera)
-    arrived = carried(pair, source_depth(camera))
+    arrived = reprojected(pair, source_depth(camera))
     inside = arrived > 0
     slope = 0.02  # of the plane's inverse depth over the pixel that a point may be off
     error = (arrived * pair.depth - 1).abs()
@@ -49,10 +51,10 @@ def test_a_plane_arrives_where_it_is_and_closed(camera: Camera) -> None:
 def test_what_the_source_has_not_measured_does_not_arrive() -> None:
     pair = plane_pair()
     depth = source_depth()
-    assert not carried(pair, torch.zeros_like(depth)).any()
+    assert not reprojected(pair, torch.zeros_like(depth)).any()
     halved = depth.clone()
     halved[..., : CAMERA.width_px // 2] = 0
-    before, after = carried(pair, depth) > 0, carried(pair, halved) > 0
+    before, after = reprojected(pair, depth) > 0, reprojected(pair, halved) > 0
     assert bool((before | ~after).all())
     assert 0.1 < float(after.double().mean() / before.double().mean()) < 0.9
 
@@ -69,7 +71,7 @@ def steps(focal_px: float, baseline: float) -> tuple[Tensor, Tensor, Tensor]:
 
 def test_what_the_card_hides_from_the_source_is_left_open() -> None:
     depth, K, pose = steps(focal_px=40.0, baseline=0.8)
-    arrived = carry_inverse_depth(1 / depth, K, K, pose, (20, 60))
+    arrived = reproject_inverse_depth(1 / depth, K, K, pose, (20, 60))
     # Disparities are 16 px of the card and 8 px of the wall: the card, at 36 to 46,
     # is followed or led by a strip of 8 px that the source does not see.
     row = arrived[0, 0, 10]
@@ -81,16 +83,16 @@ def test_what_the_card_hides_from_the_source_is_left_open() -> None:
 def test_what_comes_to_lie_behind_the_reference_is_dropped() -> None:
     depth, K, pose = steps(focal_px=40.0, baseline=0.0)
     pose[0, 2, 3] = 3.0  # the reference is 3 units before the source: past the card
-    arrived = carry_inverse_depth(1 / depth, K, K, pose, (20, 60))
+    arrived = reproject_inverse_depth(1 / depth, K, K, pose, (20, 60))
     assert torch.allclose(arrived[arrived > 0], torch.ones(1).double())
 
 
 def test_the_views_of_a_batch_do_not_mix() -> None:
     depth, K, pose = steps(focal_px=40.0, baseline=0.8)
     inverse = torch.cat([1 / depth, 1 / (2 * depth)])
-    both = carry_inverse_depth(
+    both = reproject_inverse_depth(
         inverse, K.repeat(2, 1, 1), K.repeat(2, 1, 1), pose.repeat(2, 1, 1), (20, 60)
     )
     for index in range(2):
-        one = carry_inverse_depth(inverse[index : index + 1], K, K, pose, (20, 60))
+        one = reproject_inverse_depth(inverse[index : index + 1], K, K, pose, (20, 60))
         assert torch.equal(both[index], one[0])

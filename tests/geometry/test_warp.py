@@ -89,8 +89,8 @@ def test_points_without_depth_or_behind_the_source_are_outside_and_black() -> No
     pose[..., 2, 3] -= 100.0  # the source, far beyond the plane, looks away from it
     behind = dataclasses.replace(pair, source_from_reference=pose)
     empty = dataclasses.replace(pair, depth=torch.zeros_like(pair.depth))
-    for case in (behind, empty):
-        warped, inside = warp(case)
+    for sample in (behind, empty):
+        warped, inside = warp(sample)
         assert not inside.any()
         assert not warped.any()
 

@@ -115,11 +115,11 @@ def test_the_second_network_looks_at_the_refined_depth_and_the_extremes() -> Non
     net = shaken(ResDepthNet(config)).eval()
     stack, asked = stack_for(config), []
 
-    def look(depths: torch.Tensor) -> torch.Tensor:
+    def sample_source(depths: torch.Tensor) -> torch.Tensor:
         asked.append(depths)
         return depths.sin()
 
-    sighted = net(stack, look).inverse_depth
+    sighted = net(stack, sample_source).inverse_depth
     (depths,) = asked
     assert depths.shape == (2, 3, 16, 24)
     assert not depths.requires_grad
@@ -136,16 +136,17 @@ def test_the_second_network_looks_at_the_refined_depth_and_the_extremes() -> Non
 
 
 @pytest.mark.parametrize(
-    "options", [{"variant": "mono"}, {"second_look": False}, {"variant": "depth-only"}]
+    "options",
+    [{"variant": "mono"}, {"source_resampling": False}, {"variant": "depth-only"}],
 )
 def test_without_a_source_or_a_wish_nothing_looks(options: dict[str, object]) -> None:
     config = small(**options)
     net = shaken(ResDepthNet(config)).eval()
 
-    def look(depths: torch.Tensor) -> torch.Tensor:
+    def sample_source(depths: torch.Tensor) -> torch.Tensor:
         raise AssertionError(depths.shape)
 
-    assert torch.isfinite(net(stack_for(config), look).inverse_depth).all()
+    assert torch.isfinite(net(stack_for(config), sample_source).inverse_depth).all()
 
 
 def test_another_number_of_channels_is_refused_by_name() -> None:

@@ -67,7 +67,9 @@ def test_what_may_surprise_is_a_warning(tmp_path: Path) -> None:
 
 def test_passes_cost_in_proportion(tmp_path: Path) -> None:
     folder = plane_folder(tmp_path)
-    one, two = (inspect(folder, RefineConfig(passes=n)).estimate for n in (1, 2))
+    one, two = (
+        inspect(folder, RefineConfig(inner_iterations=n)).estimate for n in (1, 2)
+    )
     assert two.refine_s == pytest.approx(2 * one.refine_s)
 
 

@@ -23,7 +23,7 @@ from resdepth_colmap.pipeline.view_images import ViewImages
 from resdepth_colmap.progress import Advance
 from resdepth_colmap.scene import DepthMap
 
-CONFIG = RefineConfig(tile_px=64, overlap_px=16, keep_confirmed=False)
+CONFIG = RefineConfig(tile_px=64, overlap_px=16, update_gating=False)
 
 
 class Watcher:
@@ -59,7 +59,7 @@ def refine(
     watcher: Watcher | None = None,
     overwrite: bool = False,
 ) -> RefineReport:
-    config = dataclasses.replace(CONFIG, rounds=rounds, weights=weights)
+    config = dataclasses.replace(CONFIG, outer_iterations=rounds, weights=weights)
     return refine_workspace(
         open_workspace(folder), config, overwrite=overwrite, progress=watcher
     )

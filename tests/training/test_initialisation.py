@@ -112,7 +112,7 @@ def test_a_wider_propagation_that_looks_again_begins_as_the_narrow_one(
 ) -> None:
     torch.manual_seed(5)
     narrow = dataclasses.replace(
-        NETWORK, propagation_channels=6, second_look=False, shared_features=False
+        NETWORK, propagation_channels=6, source_resampling=False, shared_features=False
     )
     old = ResDepthNet(narrow)
     assert old.propagation is not None
@@ -125,11 +125,11 @@ def test_a_wider_propagation_that_looks_again_begins_as_the_narrow_one(
     config = TrainConfig(init=path)
     options = {
         "propagation_channels": 9,
-        "second_look": True,
+        "source_resampling": True,
         "shared_features": True,
     }
     wide = fresh_network(chosen_network(config, options), config).eval()
-    assert wide.config.looks_again
+    assert wide.config.resamples_source
     stack = torch.randn(1, len(NETWORK.channels), 16, 16)
     expected, actual = load_weights(path)(stack), wide(stack, torch.sin)
     torch.testing.assert_close(actual.log_scale, expected.log_scale)
@@ -150,8 +150,8 @@ def test_an_input_that_the_weights_know_is_not_taken_away(weights: Path) -> None
 
 
 def test_a_second_round_needs_a_network_that_did_the_first(weights: Path) -> None:
-    config = TrainConfig(rounds=2)
-    with pytest.raises(ConfigError, match="there is no network that could do"):
+    config = TrainConfig(outer_iterations=2)
+    with pytest.raises(ConfigError, match="no network could do"):
         fresh_network(NETWORK, config)
-    config = TrainConfig(rounds=2, init=weights)
+    config = TrainConfig(outer_iterations=2, init=weights)
     assert fresh_network(chosen_network(config, {}), config).config.source_depth

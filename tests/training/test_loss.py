@@ -8,7 +8,7 @@ from torch import Tensor
 
 from resdepth_colmap.network.unet import Refinement
 from resdepth_colmap.pipeline.refine.network_inputs import Scaling
-from resdepth_colmap.pipeline.refine.source_sampler import SecondLook
+from resdepth_colmap.pipeline.refine.source_sampler import SourceSampler
 from resdepth_colmap.training.config import Preset, TrainConfig
 from resdepth_colmap.training.data.crops import Batch
 from resdepth_colmap.training.loss import refinement_loss
@@ -28,7 +28,7 @@ def batch() -> Batch:
         target=random(0),
         known=random(1) > 0,
         scaling=Scaling(*torch.tensor([[1.0, 2.0], [0.2, 0.8]])[..., None, None, None]),
-        second_look=SecondLook((None, None)),
+        source_sampler=SourceSampler((None, None)),
         importance=torch.ones(SHAPE),
         names=("a", "b"),
     )
@@ -132,7 +132,7 @@ def test_a_pixel_of_two_surfaces_is_drawn_to_the_likelier(num_far: int) -> None:
         target=target,
         known=torch.ones_like(target, dtype=torch.bool),
         scaling=Scaling(torch.full((1, 1, 1, 1), 2.0), torch.full((1, 1, 1, 1), 0.6)),
-        second_look=SecondLook((None,)),
+        source_sampler=SourceSampler((None,)),
         importance=torch.ones_like(target),
         names=("a",),
     )

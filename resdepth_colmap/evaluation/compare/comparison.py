@@ -17,16 +17,16 @@ from resdepth_colmap.evaluation.cloud.reference_cloud import (
 from resdepth_colmap.evaluation.cloud.scores import CloudScores
 from resdepth_colmap.evaluation.compare.config import CompareConfig
 from resdepth_colmap.evaluation.compare.method_clouds import (
-    ArmCloud,
-    fuse_arms,
+    MethodCloud,
+    fuse_methods,
     fusion_settings,
 )
-from resdepth_colmap.evaluation.compare.method_maps import ArmMaps
+from resdepth_colmap.evaluation.compare.method_maps import MethodMaps
 from resdepth_colmap.evaluation.compare.methods import (
     REFINED,
-    Arm,
-    FoundArms,
-    find_arms,
+    FoundMethods,
+    Method,
+    find_methods,
 )
 from resdepth_colmap.evaluation.compare.view_metrics import (
     MeasuredView,
@@ -81,8 +81,8 @@ class Comparison:
         seconds: Wall time of all.
     """
 
-    found: FoundArms
-    clouds: dict[str, dict[str, ArmCloud]]
+    found: FoundMethods
+    clouds: dict[str, dict[str, MethodCloud]]
     scores: dict[str, dict[str, CloudScores]]
     settings: dict[str, dict[str, Any]]
     truth: CloudTruth | None
@@ -92,76 +92,83 @@ class Comparison:
 
     def to_mapping(self) -> dict[str, Any]:
         """Plain values, ready for JSON; no path of this machine among them."""
-        arms = self.found.arms
+        methods = self.found.methods
         return {
             "views": [view.name for view in self.found.views],
-            "arms": {
-                arm.name: {
-                    "kind": arm.kind,
-                    "normals": "own" if arm.own_normals else "computed from the depth",
+            "methods": {
+                method.name: {
+                    "kind": method.kind,
+                    "normals": "own"
+                    if method.own_normals
+                    else "computed from the depth",
                 }
-                for arm in arms
+                for method in methods
             },
             "notes": list(self.notes),
             "fusion": self.settings,
             "truth": None if self.truth is None else self.truth.to_mapping(),
             "clouds": {
                 fuser: {
-                    arm: {**cloud.to_mapping(), "scores": self._scores(fuser, arm)}
-                    for arm, cloud in clouds.items()
+                    method: {
+                        **cloud.to_mapping(),
+                        "scores": self._scores(fuser, method),
+                    }
+                    for method, cloud in clouds.items()
                 }
                 for fuser, clouds in self.clouds.items()
             },
-            "measures": {arm.name: self._means(arm) for arm in arms},
+            "measures": {method.name: self._means(method) for method in methods},
             "paired": {
-                f"{REFINED} - {arm.name}": self._paired(arm)
-                for arm in arms
-                if arm.name != REFINED
+                f"{REFINED} - {method.name}": self._paired(method)
+                for method in methods
+                if method.name != REFINED
             },
             "per_view": {
                 view.name: {
-                    arm: {name: _plain(it.mean) for name, it in sums.items()}
-                    for arm, sums in view.sums.items()
+                    method: {name: _plain(it.mean) for name, it in sums.items()}
+                    for method, sums in view.sums.items()
                 }
                 for view in self.views
             },
             "seconds": round(self.seconds, 2),
         }
 
-    def _scores(self, fuser: str, arm: str) -> dict[str, Any] | None:
-        scores = self.scores.get(fuser, {}).get(arm)
+    def _scores(self, fuser: str, method: str) -> dict[str, Any] | None:
+        scores = self.scores.get(fuser, {}).get(method)
         return None if scores is None else scores.to_mapping()
 
-    def _values(self, arm: str, measure: str) -> list[float]:
+    def _values(self, method: str, measure: str) -> list[float]:
         """The measure of each view; NaN where it has none."""
         return [
-            view.sums[arm][measure].mean
-            if measure in view.sums.get(arm, {})
+            view.sums[method][measure].mean
+            if measure in view.sums.get(method, {})
             else math.nan
             for view in self.views
         ]
 
-    def _tiles(self, arm: str, measure: str) -> Any:
+    def _tiles(self, method: str, measure: str) -> Any:
         tiles = [
-            view.sums[arm][measure].means
+            view.sums[method][measure].means
             for view in self.views
-            if measure in view.sums.get(arm, {})
+            if measure in view.sums.get(method, {})
         ]
         return np.concatenate(tiles) if tiles else np.zeros(0)
 
-    def _means(self, arm: Arm) -> dict[str, float | None]:
+    def _means(self, method: Method) -> dict[str, float | None]:
         means = {}
         for measure in MEASURES:
-            values = [it for it in self._values(arm.name, measure) if math.isfinite(it)]
+            values = [
+                it for it in self._values(method.name, measure) if math.isfinite(it)
+            ]
             means[measure] = _plain(sum(values) / len(values)) if values else None
         return means
 
-    def _paired(self, arm: Arm) -> dict[str, Any]:
+    def _paired(self, method: Method) -> dict[str, Any]:
         """By measure the differences of the views, and of their tiles."""
         paired = {}
         for measure in MEASURES:
-            values = (self._values(it, measure) for it in (REFINED, arm.name))
-            tiles = (self._tiles(it, measure) for it in (REFINED, arm.name))
+            values = (self._values(it, measure) for it in (REFINED, method.name))
+            tiles = (self._tiles(it, measure) for it in (REFINED, method.name))
             paired[measure] = {
                 "views": paired_difference(*values).to_mapping(),
                 "tiles": paired_difference(*tiles, resample=False).to_mapping(),
@@ -193,7 +200,7 @@ def compare_workspace(
     workspace = open_workspace(path)
     scene = read_scene(workspace.sparse_path, workspace.images_path, workspace.path)
     output = OutputWorkspace(source=workspace, in_place=in_place)
-    found = find_arms(output, scene, config)
+    found = find_methods(output, scene, config)
     _check_images(output, scene, found)
     depth_truth = read_depth_truth(workspace, scene, config.tolerances)
     witnesses = Witnesses(
@@ -202,9 +209,9 @@ def compare_workspace(
         points=read_sparse_points(workspace.sparse_path),
         truth=depth_truth,
     )
-    maps = ArmMaps(found.arms, config.fuse.min_confidence)
+    maps = MethodMaps(found.methods, config.fuse.min_confidence)
     views = measure_views(maps, witnesses, progress)
-    clouds = fuse_arms(workspace, scene, found.arms, config.fuse, progress)
+    clouds = fuse_methods(workspace, scene, found.methods, config.fuse, progress)
     truth = truth or depth_truth
     return Comparison(
         found=found,
@@ -218,14 +225,14 @@ def compare_workspace(
     )
 
 
-def _check_images(output: OutputWorkspace, scene: Scene, found: FoundArms) -> None:
+def _check_images(output: OutputWorkspace, scene: Scene, found: FoundMethods) -> None:
     """The photos of the compared views have to be there; others may be missing."""
     compared = dataclasses.replace(scene, views=found.views)
     check_images(output.source, compared)
 
 
 def _scored(
-    clouds: dict[str, dict[str, ArmCloud]],
+    clouds: dict[str, dict[str, MethodCloud]],
     truth: CloudTruth | None,
     progress: Progress,
 ) -> dict[str, dict[str, CloudScores]]:
@@ -233,11 +240,11 @@ def _scored(
         return {}
     return {
         fuser: {
-            arm: truth.score(it.cloud.points, progress)
-            for arm, it in arms.items()
+            method: truth.score(it.cloud.points, progress)
+            for method, it in methods.items()
             if it.cloud is not None
         }
-        for fuser, arms in clouds.items()
+        for fuser, methods in clouds.items()
     }
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from resdepth_colmap.config import FuseConfig, Fuser
 from resdepth_colmap.errors import FusionError
 from resdepth_colmap.evaluation.compare.method_maps import confident_depth
-from resdepth_colmap.evaluation.compare.methods import Arm
+from resdepth_colmap.evaluation.compare.methods import Method
 from resdepth_colmap.geometry.normals import normals_from_depth
 from resdepth_colmap.geometry.pixels import index_K
 from resdepth_colmap.io.colmap.depth_map import write_depth_map
@@ -36,7 +36,7 @@ NO_TRACKS = (
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
-class ArmCloud:
+class MethodCloud:
     """The cloud of an arm.
 
     Attributes:
@@ -64,13 +64,13 @@ class ArmCloud:
         }
 
 
-def fuse_arms(
+def fuse_methods(
     workspace: Workspace,
     scene: Scene,
-    arms: Sequence[Arm],
+    methods: Sequence[Method],
     config: FuseConfig,
     progress: Progress,
-) -> dict[str, dict[str, ArmCloud]]:
+) -> dict[str, dict[str, MethodCloud]]:
     """Fuse every arm twice; nothing is written into the workspace.
 
     Each arm becomes a temporary workspace of links. Where a view has no normal map,
@@ -79,7 +79,7 @@ def fuse_arms(
     Args:
         workspace: The user's.
         scene: Its views.
-        arms: What to fuse.
+        methods: What to fuse.
         config: Thresholds of both.
         progress: Who listens.
 
@@ -89,13 +89,13 @@ def fuse_arms(
     Raises:
         WorkspaceError: If a map cannot be read, or the temporary folder not be written.
     """
-    clouds: dict[str, dict[str, ArmCloud]] = {str(fuser): {} for fuser in Fuser}
-    for arm in arms:
+    clouds: dict[str, dict[str, MethodCloud]] = {str(fuser): {} for fuser in Fuser}
+    for method in methods:
         with tempfile.TemporaryDirectory(prefix="resdepth-compare-") as folder:
-            copy = _linked(workspace, arm, config.min_confidence, Path(folder))
-            files = [_file_in(copy, file) for file in arm.files]
+            copy = _linked(workspace, method, config.min_confidence, Path(folder))
+            files = [_file_in(copy, file) for file in method.files]
             for fuser in Fuser:
-                clouds[str(fuser)][arm.name] = _fused(
+                clouds[str(fuser)][method.name] = _fused(
                     copy,
                     scene,
                     files,
@@ -135,18 +135,18 @@ def _fused(
     files: Sequence[MapFiles],
     config: FuseConfig,
     progress: Progress,
-) -> ArmCloud:
+) -> MethodCloud:
     start = time.perf_counter()
     if config.fuser is Fuser.OPEN3D:
         found = fuse_maps(files, scene, config, progress)
     elif scene.num_shared_points is None:
-        return ArmCloud(cloud=None, note=NO_TRACKS)
+        return MethodCloud(cloud=None, note=NO_TRACKS)
     else:
         try:
             found = fuse_with_colmap(copy.workspace, scene, files, config)
         except FusionError as error:
-            return ArmCloud(cloud=None, note=" ".join(str(error).split()))
-    return ArmCloud(
+            return MethodCloud(cloud=None, note=" ".join(str(error).split()))
+    return MethodCloud(
         cloud=found.cloud,
         statistics=found.statistics,
         seconds=time.perf_counter() - start,
@@ -155,14 +155,14 @@ def _fused(
 
 
 def _linked(
-    workspace: Workspace, arm: Arm, min_confidence: float, folder: Path
+    workspace: Workspace, method: Method, min_confidence: float, folder: Path
 ) -> OutputWorkspace:
     """A workspace with the arm's maps, named as COLMAP's fusion wants them."""
     copy = OutputWorkspace(source=dataclasses.replace(workspace, path=folder))
-    names = [file.view.name for file in arm.files]
+    names = [file.view.name for file in method.files]
     copy.prepare(names)
     copy.write_cfgs(names)
-    for file in arm.files:
+    for file in method.files:
         _place_maps(copy, file, min_confidence)
     return copy
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from resdepth_colmap.evaluation.compare.methods import Arm
+from resdepth_colmap.evaluation.compare.methods import Method
 from resdepth_colmap.geometry.pixels import index_K
 from resdepth_colmap.io.colmap.depth_map import read_depth_map
 from resdepth_colmap.pipeline.fuse.views import MapFiles
@@ -44,18 +44,18 @@ class ViewMaps:
         return np.asarray(np.logical_and.reduce(covered))
 
 
-class ArmMaps(Sequence[ViewMaps]):
+class MethodMaps(Sequence[ViewMaps]):
     """The compared views; the latest of their maps stay in memory."""
 
-    def __init__(self, arms: Sequence[Arm], min_confidence: float = 0.0) -> None:
+    def __init__(self, methods: Sequence[Method], min_confidence: float = 0.0) -> None:
         """Read nothing yet; depth of less than that confidence counts as none."""
-        self._arms = arms
+        self._methods = methods
         self._min_confidence = min_confidence
         self._cache = ArrayCache(MAX_NUM_BYTES)
 
     def __len__(self) -> int:
         """The number of views."""
-        return len(self._arms[0].files)
+        return len(self._methods[0].files)
 
     def __getitem__(self, index: int) -> ViewMaps:  # type: ignore[override] # no slices
         """The maps of a view, a smaller one at the size of the largest.
@@ -63,11 +63,11 @@ class ArmMaps(Sequence[ViewMaps]):
         Raises:
             WorkspaceError: If a map cannot be read.
         """
-        files = {arm.name: arm.files[index] for arm in self._arms}
+        files = {method.name: method.files[index] for method in self._methods}
         depths = {name: self._depth(name, file) for name, file in files.items()}
         height_px, width_px = max(depth.shape for depth in depths.values())
         size = (width_px, height_px)
-        view = self._arms[0].files[index].view
+        view = self._methods[0].files[index].view
         return ViewMaps(
             view=view,
             K=index_K(view.camera.resized(width_px, height_px)),
@@ -79,9 +79,10 @@ class ArmMaps(Sequence[ViewMaps]):
             },
         )
 
-    def _depth(self, arm: str, file: MapFiles) -> DepthMap:
+    def _depth(self, method: str, file: MapFiles) -> DepthMap:
         return self._cache.get(
-            (arm, file.view.name), lambda: confident_depth(file, self._min_confidence)
+            (method, file.view.name),
+            lambda: confident_depth(file, self._min_confidence),
         )
 
 

@@ -16,7 +16,7 @@ from resdepth_colmap.pipeline.initial_map import check_map_size, map_path
 from resdepth_colmap.pipeline.refine.cross_view import FILTERED_SHARE
 from resdepth_colmap.scene import Scene, View
 
-ARMS = ("filtered", "unfiltered", "refined")
+METHODS = ("filtered", "unfiltered", "refined")
 REFINED = "refined"
 
 _PREFERRED = "geometric"  # what COLMAP calls its last maps
@@ -29,7 +29,7 @@ _WITHOUT = {
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
-class Arm:
+class Method:
     """The maps of one arm.
 
     Attributes:
@@ -52,27 +52,27 @@ class Arm:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
-class FoundArms:
+class FoundMethods:
     """The arms that a workspace has.
 
     Attributes:
-        arms: The refined maps, and filtered ones or unfiltered ones or both, of the
+        methods: The refined maps, and filtered ones or unfiltered ones or both, of the
             same views.
         notes: What there is to say about what is missing.
     """
 
-    arms: tuple[Arm, ...]
+    methods: tuple[Method, ...]
     notes: tuple[str, ...]
 
     @property
     def views(self) -> tuple[View, ...]:
         """The views that are compared: all arms have a map of each."""
-        return tuple(file.view for file in self.arms[0].files)
+        return tuple(file.view for file in self.methods[0].files)
 
 
-def find_arms(
+def find_methods(
     output: OutputWorkspace, scene: Scene, config: CompareConfig
-) -> FoundArms:
+) -> FoundMethods:
     """Find the arms of a workspace; the maps themselves are only looked through.
 
     Args:
@@ -109,7 +109,7 @@ def find_arms(
         )
     notes = [
         f"{name} arm: {_WITHOUT[name].format(kinds='depth')}."
-        for name in ARMS
+        for name in METHODS
         if name != REFINED and name not in chosen
     ]
     if len(compared) < len(scene.views):
@@ -117,10 +117,10 @@ def find_arms(
             f"{len(compared)} of {len(scene.views)} views are compared: only they have "
             "a map in every arm."
         )
-    return FoundArms(
-        arms=tuple(
-            _arm(output, compared, name, chosen.get(name, REFINED))
-            for name in ARMS
+    return FoundMethods(
+        methods=tuple(
+            _method(output, compared, name, chosen.get(name, REFINED))
+            for name in METHODS
             if name == REFINED or name in chosen
         ),
         notes=tuple(notes),
@@ -165,10 +165,12 @@ def _chosen_kinds(
     return {name: kind for name, kind in chosen.items() if kind}
 
 
-def _arm(output: OutputWorkspace, views: Sequence[View], name: str, kind: str) -> Arm:
+def _method(
+    output: OutputWorkspace, views: Sequence[View], name: str, kind: str
+) -> Method:
     make = _refined_file if name == REFINED else _initial_file
     files = tuple(make(output, view, kind) for view in views)
-    return Arm(name=name, kind=kind, files=files)
+    return Method(name=name, kind=kind, files=files)
 
 
 def _refined_file(output: OutputWorkspace, view: View, _kind: str) -> MapFiles:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from resdepth_colmap.evaluation.cloud.reference_cloud import DepthTruth
-from resdepth_colmap.evaluation.compare.method_maps import ArmMaps, ViewMaps
+from resdepth_colmap.evaluation.compare.method_maps import MethodMaps, ViewMaps
 from resdepth_colmap.evaluation.compare.methods import REFINED
 from resdepth_colmap.evaluation.metrics.reference_free import (
     Sums,
@@ -75,7 +75,7 @@ class Witnesses:
 
 
 def measure_views(
-    maps: ArmMaps, witnesses: Witnesses, progress: Progress
+    maps: MethodMaps, witnesses: Witnesses, progress: Progress
 ) -> list[MeasuredView]:
     """Measure view by view.
 
@@ -100,7 +100,7 @@ def measure_views(
 
 
 def _measured(
-    all_maps: ArmMaps, place: int, neighbours: Sequence[int], witnesses: Witnesses
+    all_maps: MethodMaps, place: int, neighbours: Sequence[int], witnesses: Witnesses
 ) -> MeasuredView:
     maps = all_maps[place]
     scene = witnesses.scene

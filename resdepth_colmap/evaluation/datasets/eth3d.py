@@ -21,9 +21,9 @@ from resdepth_colmap.evaluation.datasets.eth3d_pairs import (
 from resdepth_colmap.evaluation.datasets.eth3d_truth import undistorted_truth
 from resdepth_colmap.evaluation.datasets.paper import PAPER_IMAGE_WIDTH_PX, PAPER_ROWS
 from resdepth_colmap.evaluation.datasets.sample import (
-    CaseOptions,
-    DepthCase,
-    LazyCase,
+    DepthSample,
+    LazySample,
+    SampleOptions,
     SceneSource,
 )
 from resdepth_colmap.geometry.depth_range import depth_range
@@ -89,7 +89,7 @@ def eth3d_sources(root: Path, options: Eth3dOptions) -> tuple[SceneSource, ...]:
     path = options.pairs_file(root)
     listed = {} if path is None else read_pairs(path)
 
-    def read(name: str, wanted: CaseOptions) -> list[LazyCase]:
+    def read(name: str, wanted: SampleOptions) -> list[LazySample]:
         if name not in scenes:
             raise WorkspaceError(
                 f"{root}: no scene {name} in it; there are: {', '.join(scenes)}; "
@@ -100,7 +100,7 @@ def eth3d_sources(root: Path, options: Eth3dOptions) -> tuple[SceneSource, ...]:
             pairs = named_pairs(path, listed[name], reader.indices)
         else:
             pairs = reader.pairs_by_rule(options.num_pairs)
-        return [functools.partial(reader.case, pair, wanted) for pair in pairs]
+        return [functools.partial(reader.sample, pair, wanted) for pair in pairs]
 
     names = dict.fromkeys(options.scenes or scenes)
     return tuple(
@@ -145,7 +145,7 @@ class _SceneReader:
             )
         return pairs
 
-    def case(self, pair: Pair, wanted: CaseOptions) -> DepthCase:
+    def sample(self, pair: Pair, wanted: SampleOptions) -> DepthSample:
         """Read the images and the truth of a pair."""
         reference, source = (self.scene.views[index] for index in pair)
         camera = self._camera(reference)
@@ -160,7 +160,7 @@ class _SceneReader:
                 f"{self.files.truth_path(_file_name(reference))}: no depth in it falls "
                 f"into the undistorted image; {DISTORTED} is of other images."
             )
-        return DepthCase(
+        return DepthSample(
             name=f"{_file_name(reference)} {_file_name(source)}",
             reference=self._match_view(reference),
             sources=(self._match_view(source),),

@@ -13,7 +13,11 @@ import numpy as np
 import numpy.typing as npt
 
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.evaluation.datasets.sample import CaseOptions, DepthCase, LazyCase
+from resdepth_colmap.evaluation.datasets.sample import (
+    DepthSample,
+    LazySample,
+    SampleOptions,
+)
 from resdepth_colmap.io.images import read_gray, read_unit_colors
 from resdepth_colmap.io.pfm import read_pfm
 from resdepth_colmap.matching.patch_match import MatchView
@@ -35,12 +39,12 @@ def is_middlebury_scene(path: Path) -> bool:
     return (path / CALIBRATION_NAME).is_file() and not (path / "sparse").is_dir()
 
 
-def read_middlebury_cases(path: Path, options: CaseOptions) -> list[LazyCase]:
+def read_middlebury_samples(path: Path, options: SampleOptions) -> list[LazySample]:
     """The one case of a scene as distributed; see `read_middlebury_case`."""
-    return [functools.partial(read_middlebury_case, path, options)]
+    return [functools.partial(read_middlebury_sample, path, options)]
 
 
-def read_middlebury_case(path: Path, options: CaseOptions) -> DepthCase:
+def read_middlebury_sample(path: Path, options: SampleOptions) -> DepthSample:
     """Read a scene as distributed: im0 against im1.
 
     Args:
@@ -71,7 +75,7 @@ def read_middlebury_case(path: Path, options: CaseOptions) -> DepthCase:
         for gray, camera, pose in zip(images, ("cam0", "cam1"), poses, strict=True)
     ]
     near, far = options.stereo.depth_min, options.stereo.depth_max
-    return DepthCase(
+    return DepthSample(
         name=IMAGE_NAMES[0],
         reference=views[0],
         sources=(views[1],),

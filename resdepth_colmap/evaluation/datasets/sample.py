@@ -30,7 +30,7 @@ class InitialDepth:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
-class DepthCase:
+class DepthSample:
     """One view whose depth is known.
 
     Attributes:
@@ -63,7 +63,7 @@ class DepthCase:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class CaseOptions:
+class SampleOptions:
     """What decides how much of a scene has to be read.
 
     Attributes:
@@ -75,7 +75,7 @@ class CaseOptions:
     num_sources: int
 
 
-LazyCase = Callable[[], DepthCase]
+LazySample = Callable[[], DepthSample]
 """Reads a case; WorkspaceError if it is broken."""
 
 
@@ -89,7 +89,7 @@ class SceneSource:
     """
 
     name: str
-    read: Callable[[CaseOptions], Sequence[LazyCase]]
+    read: Callable[[SampleOptions], Sequence[LazySample]]
 
 
 def source_from_reference(reference: MatchView, source: MatchView) -> Matrix:

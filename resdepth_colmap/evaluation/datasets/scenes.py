@@ -6,16 +6,16 @@ from pathlib import Path
 
 from resdepth_colmap.evaluation.datasets.middlebury import (
     is_middlebury_scene,
-    read_middlebury_cases,
+    read_middlebury_samples,
 )
 from resdepth_colmap.evaluation.datasets.sample import (
-    CaseOptions,
-    LazyCase,
+    LazySample,
+    SampleOptions,
     SceneSource,
 )
 from resdepth_colmap.evaluation.datasets.workspaces import (
     TRUTH_FOLDER,
-    read_workspace_cases,
+    read_workspace_samples,
 )
 
 
@@ -47,8 +47,10 @@ def _is_scene(path: Path) -> bool:
     return (path / TRUTH_FOLDER).is_dir() or is_middlebury_scene(path)
 
 
-def _reader(path: Path) -> Callable[[Path, CaseOptions], Sequence[LazyCase]]:
-    return read_middlebury_cases if is_middlebury_scene(path) else read_workspace_cases
+def _reader(path: Path) -> Callable[[Path, SampleOptions], Sequence[LazySample]]:
+    return (
+        read_middlebury_samples if is_middlebury_scene(path) else read_workspace_samples
+    )
 
 
 def distinct_names(folders: Sequence[Path]) -> list[str]:

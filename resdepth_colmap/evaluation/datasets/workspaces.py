@@ -9,10 +9,10 @@ import numpy.typing as npt
 
 from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.evaluation.datasets.sample import (
-    CaseOptions,
-    DepthCase,
+    DepthSample,
     InitialDepth,
-    LazyCase,
+    LazySample,
+    SampleOptions,
 )
 from resdepth_colmap.geometry.depth_range import depth_range
 from resdepth_colmap.geometry.pixels import index_K
@@ -36,7 +36,7 @@ _SEEN = 1  # 255 in the file; occluded pixels are grey
 _WAY_OUT = "data/README.md says what a workspace with truth holds"
 
 
-def read_workspace_cases(path: Path, options: CaseOptions) -> list[LazyCase]:
+def read_workspace_samples(path: Path, options: SampleOptions) -> list[LazySample]:
     """The views of a workspace whose true depth is known, with the maps that it has.
 
     A view starts from its fullest map; one without any is to be matched against the
@@ -56,7 +56,7 @@ def read_workspace_cases(path: Path, options: CaseOptions) -> list[LazyCase]:
     check_images(workspace, scene)
     images = ViewImages(workspace, IMAGE_CACHE_BYTES)
     return [
-        functools.partial(_case, workspace, scene, scene.index(name), images, options)
+        functools.partial(_sample, workspace, scene, scene.index(name), images, options)
         for name in names
     ]
 
@@ -77,13 +77,13 @@ def _names_with_truth(workspace: Workspace, scene: Scene) -> list[str]:
     return names
 
 
-def _case(
+def _sample(
     workspace: Workspace,
     scene: Scene,
     index: int,
     images: ViewImages,
-    options: CaseOptions,
-) -> DepthCase:
+    options: SampleOptions,
+) -> DepthSample:
     view = scene.views[index]
     truth = _truth(workspace, view)
     initial = _initial(workspace, view)
@@ -102,7 +102,7 @@ def _case(
         maps = [_map_of(workspace, scene.views[other]) for other in sources]
         initial = dataclasses.replace(initial, source_depths=tuple(maps))
     near, far = options.stereo.depth_min, options.stereo.depth_max
-    return DepthCase(
+    return DepthSample(
         name=view.name,
         reference=_match_view(images, view),
         sources=tuple(_match_view(images, scene.views[other]) for other in sources),

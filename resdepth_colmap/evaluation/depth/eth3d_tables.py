@@ -57,9 +57,9 @@ def paper_table(measured: Measured) -> str:
 def errors_table(measured: Measured) -> str:
     """Every depth of every scene: errors in metres, shares off by centimetres."""
     rows = [
-        [name, label, *_error_cells(errors[arm])]
+        [name, label, *_error_cells(errors[method])]
         for name, errors in result_rows(measured)
-        for arm, label in DEPTHS.items()
+        for method, label in DEPTHS.items()
     ]
     return markdown_table(
         "scene | depth | MAE, m | RMSE, m | MedAE, m | off by > 1 cm | > 2 cm | "
@@ -73,8 +73,8 @@ def _paper_row(name: str, scene: Measured | None, paper: PaperRow | None) -> lis
     measured: list[float | None] = [None] * 4
     if scene is not None:
         measured = [
-            scene[arm][error]
-            for arm in ("refined", "unfiltered")
+            scene[method][error]
+            for method in ("refined", "unfiltered")
             for error in ("mae", "rmse")
         ]
     published: list[float | None] = [None] * 4

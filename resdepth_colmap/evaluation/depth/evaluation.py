@@ -11,12 +11,12 @@ from resdepth_colmap.config import RefineConfig, StereoBackend, StereoConfig
 from resdepth_colmap.errors import ResDepthError, WorkspaceError
 from resdepth_colmap.evaluation.datasets.paper import PAPER_MAX_RESIDUAL
 from resdepth_colmap.evaluation.datasets.sample import (
-    CaseOptions,
-    DepthCase,
+    DepthSample,
+    SampleOptions,
     SceneSource,
 )
 from resdepth_colmap.evaluation.depth.match_cache import MatchCache
-from resdepth_colmap.evaluation.depth.methods import CaseResult, measure_case
+from resdepth_colmap.evaluation.depth.methods import SampleResult, measure_sample
 from resdepth_colmap.evaluation.depth.result import DepthReport, SceneResult
 from resdepth_colmap.evaluation.depth.sample_matching import (
     initial_depth,
@@ -122,25 +122,25 @@ def _measure_scene(
     on_share: Callable[[float], None],
 ) -> SceneResult:
     num_sources = max(1, network.config.num_sources)
-    wanted = CaseOptions(stereo=options.stereo, num_sources=num_sources)
+    wanted = SampleOptions(stereo=options.stereo, num_sources=num_sources)
 
-    def measured(case: DepthCase) -> CaseResult:
-        logger.debug("%s: %s", source.name, case.name)
+    def measured(sample: DepthSample) -> SampleResult:
+        logger.debug("%s: %s", source.name, sample.name)
         initial = initial_depth(
-            source.name, case, backend, options.stereo, options.cache
+            source.name, sample, backend, options.stereo, options.cache
         )
         if not (initial.depth > 0).any():
-            raise WorkspaceError(f"{case.name}: no pixel has an initial depth.")
-        return measure_case(
-            case, initial, network, options.refine, options.max_residual
+            raise WorkspaceError(f"{sample.name}: no pixel has an initial depth.")
+        return measure_sample(
+            sample, initial, network, options.refine, options.max_residual
         )
 
-    cases = source.read(wanted)
+    samples = source.read(wanted)
     results = []
-    for read_case in cases:
-        results.append(measured(read_case()))
-        on_share(1 / len(cases))
-    return SceneResult(name=source.name, cases=tuple(results))
+    for read_sample in samples:
+        results.append(measured(read_sample()))
+        on_share(1 / len(samples))
+    return SceneResult(name=source.name, samples=tuple(results))
 
 
 def _warm_up(network: ResDepthNet, config: RefineConfig) -> None:

@@ -11,19 +11,19 @@ import numpy as np
 import numpy.typing as npt
 
 from resdepth_colmap.config import RefineConfig
-from resdepth_colmap.evaluation.datasets.sample import DepthCase, InitialDepth
-from resdepth_colmap.evaluation.depth.sample_refinement import refine_case
+from resdepth_colmap.evaluation.datasets.sample import DepthSample, InitialDepth
+from resdepth_colmap.evaluation.depth.sample_refinement import refine_sample
 from resdepth_colmap.evaluation.metrics.depth_metrics import median_filtered
 from resdepth_colmap.evaluation.metrics.depth_regions import edge_region
 from resdepth_colmap.evaluation.metrics.pooled_metrics import ErrorSample
 from resdepth_colmap.network.unet import ResDepthNet
 
-ARMS = ("unfiltered", "median", "refined")
+METHODS = ("unfiltered", "median", "refined")
 REGIONS = ("all", "edges", "flat")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
-class CaseResult:
+class SampleResult:
     """What was measured on one view.
 
     Attributes:
@@ -48,57 +48,57 @@ class CaseResult:
     refining_cpu_s: float
 
 
-def measure_case(
-    case: DepthCase,
+def measure_sample(
+    sample: DepthSample,
     initial: InitialDepth,
     network: ResDepthNet,
     config: RefineConfig,
     max_residual: float | None,
-) -> CaseResult:
+) -> SampleResult:
     """Refine the initial depth and compare all three maps with the truth.
 
     Args:
-        case: The view and its truth.
+        sample: The view and its truth.
         initial: Its initial depth, of the same size.
         network: On the device to run on.
         config: Rounds, passes and tiles.
         max_residual: Larger errors, in units, are discarded; None = none is.
     """
-    truth, depth = case.truth, initial.depth
-    refined = refine_case(case, initial, network, config)
-    arms = {
+    truth, depth = sample.truth, initial.depth
+    refined = refine_sample(sample, initial, network, config)
+    methods = {
         "unfiltered": depth,
         "median": median_filtered(depth),
         "refined": refined.depth,
     }
     edges = edge_region(truth)
     regions = {"all": None, "edges": edges, "flat": ~edges}
-    seen = case.seen
-    return CaseResult(
-        name=case.name,
+    seen = sample.seen
+    return SampleResult(
+        name=sample.name,
         origin=initial.origin,
         errors={
             region: {
-                arm: ErrorSample.of(values, truth, inside, max_residual)
-                for arm, values in arms.items()
+                method: ErrorSample.of(values, truth, inside, max_residual)
+                for method, values in methods.items()
             }
             for region, inside in regions.items()
         },
         seen=None if seen is None else ErrorSample.of(depth, truth, seen, max_residual),
         seen_median_relative_error=None
         if seen is None
-        else _median_relative_error(case, initial, seen),
-        megapixels=case.megapixels,
+        else _median_relative_error(sample, initial, seen),
+        megapixels=sample.megapixels,
         matching_cpu_s=initial.cpu_s,
         refining_cpu_s=refined.cpu_s,
     )
 
 
 def _median_relative_error(
-    case: DepthCase, initial: InitialDepth, seen: npt.NDArray[np.bool_]
+    sample: DepthSample, initial: InitialDepth, seen: npt.NDArray[np.bool_]
 ) -> float:
-    counted = seen & (case.truth > 0)
+    counted = seen & (sample.truth > 0)
     if not counted.any():
         return float("nan")
-    truth = case.truth[counted]
+    truth = sample.truth[counted]
     return float(np.median(np.abs(initial.depth[counted] - truth) / truth))

@@ -7,14 +7,20 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from resdepth_colmap.config import RefineConfig, StereoConfig
-from resdepth_colmap.evaluation.depth.methods import ARMS, REGIONS, CaseResult
+from resdepth_colmap.evaluation.depth.methods import METHODS, REGIONS, SampleResult
 from resdepth_colmap.evaluation.metrics.depth_metrics import DepthMetrics
 from resdepth_colmap.evaluation.metrics.pooled_metrics import ErrorSample, pooled
 
 Errors = Mapping[str, Mapping[str, ErrorSample]]
 """By region, then by arm."""
 
-_REFINE_OPTIONS = ("passes", "rounds", "keep_confirmed", "tile_px", "overlap_px")
+_REFINE_OPTIONS = (
+    "inner_iterations",
+    "outer_iterations",
+    "update_gating",
+    "tile_px",
+    "overlap_px",
+)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -23,38 +29,40 @@ class SceneResult:
 
     Attributes:
         name: What it is called.
-        cases: One result a view.
+        samples: One result a view.
     """
 
     name: str
-    cases: tuple[CaseResult, ...]
+    samples: tuple[SampleResult, ...]
 
     @property
     def errors(self) -> Errors:
         """Over the pixels of all views."""
-        return pooled_errors([case.errors for case in self.cases])
+        return pooled_errors([sample.errors for sample in self.samples])
 
     @property
     def mae_ratio(self) -> float:
         """Mean absolute error, refined over unfiltered; NaN if that is 0."""
-        arms = self.errors["all"]
-        return _ratio(arms["refined"].metrics.mae, arms["unfiltered"].metrics.mae)
+        methods = self.errors["all"]
+        return _ratio(methods["refined"].metrics.mae, methods["unfiltered"].metrics.mae)
 
     @property
     def medae_ratio(self) -> float:
         """Median absolute error, refined over unfiltered; NaN if that is 0."""
-        arms = self.errors["all"]
-        return _ratio(arms["refined"].metrics.medae, arms["unfiltered"].metrics.medae)
+        methods = self.errors["all"]
+        return _ratio(
+            methods["refined"].metrics.medae, methods["unfiltered"].metrics.medae
+        )
 
     def to_mapping(self) -> dict[str, Any]:
         """Plain values, ready for JSON."""
         mapping: dict[str, Any] = {
-            "initial": sorted({case.origin for case in self.cases}),
-            "num_views": len(self.cases),
-            "view_names": [case.name for case in self.cases],
+            "initial": sorted({sample.origin for sample in self.samples}),
+            "num_views": len(self.samples),
+            "view_names": [sample.name for sample in self.samples],
             **plain_errors(self.errors),
         }
-        if all(case.seen is not None for case in self.cases):
+        if all(sample.seen is not None for sample in self.samples):
             mapping["unfiltered_seen_by_both"] = self._seen()
         mapping |= {
             "matching_cpu_s_per_mp": self._per_megapixel("matching_cpu_s"),
@@ -62,16 +70,16 @@ class SceneResult:
             "mae_ratio": plain(self.mae_ratio),
             "medae_ratio": plain(self.medae_ratio),
         }
-        if len(self.cases) > 1:
+        if len(self.samples) > 1:
             mapping["views"] = {
-                case.name: {"initial": case.origin, **plain_errors(case.errors)}
-                for case in self.cases
+                sample.name: {"initial": sample.origin, **plain_errors(sample.errors)}
+                for sample in self.samples
             }
         return mapping
 
     def _seen(self) -> dict[str, float | int | None]:
-        samples = [case.seen for case in self.cases if case.seen is not None]
-        medians = [case.seen_median_relative_error for case in self.cases]
+        samples = [sample.seen for sample in self.samples if sample.seen is not None]
+        medians = [sample.seen_median_relative_error for sample in self.samples]
         finite = [m for m in medians if m is not None and math.isfinite(m)]
         return {
             **plain_metrics(pooled(samples).metrics),
@@ -79,11 +87,11 @@ class SceneResult:
         }
 
     def _per_megapixel(self, name: str) -> float | None:
-        timed = [c for c in self.cases if getattr(c, name) is not None]
-        megapixels = sum(case.megapixels for case in timed)
+        timed = [c for c in self.samples if getattr(c, name) is not None]
+        megapixels = sum(sample.megapixels for sample in timed)
         if not megapixels:
             return None
-        seconds = sum(float(getattr(case, name)) for case in timed)
+        seconds = sum(float(getattr(sample, name)) for sample in timed)
         return round(seconds / megapixels, 2)
 
 
@@ -144,7 +152,9 @@ class DepthReport:
 def pooled_errors(errors: Sequence[Errors]) -> Errors:
     """The errors over all pixels of several results, by region and arm."""
     return {
-        region: {arm: pooled([it[region][arm] for it in errors]) for arm in ARMS}
+        region: {
+            method: pooled([it[region][method] for it in errors]) for method in METHODS
+        }
         for region in REGIONS
     }
 
@@ -152,8 +162,8 @@ def pooled_errors(errors: Sequence[Errors]) -> Errors:
 def plain_errors(errors: Errors) -> dict[str, Any]:
     """For JSON: the arms of the whole map by their names, the regions beside them."""
     by_region = {
-        region: {arm: plain_metrics(arms[arm].metrics) for arm in ARMS}
-        for region, arms in errors.items()
+        region: {method: plain_metrics(methods[method].metrics) for method in METHODS}
+        for region, methods in errors.items()
     }
     return {**by_region["all"], **{r: by_region[r] for r in REGIONS if r != "all"}}
 

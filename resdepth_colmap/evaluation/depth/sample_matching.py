@@ -9,7 +9,7 @@ import numpy as np
 
 from resdepth_colmap.config import StereoBackend, StereoConfig
 from resdepth_colmap.errors import BackendUnavailableError, ConfigError
-from resdepth_colmap.evaluation.datasets.sample import DepthCase, InitialDepth
+from resdepth_colmap.evaluation.datasets.sample import DepthSample, InitialDepth
 from resdepth_colmap.evaluation.depth.colmap_pair import match_by_colmap
 from resdepth_colmap.evaluation.depth.match_cache import MatchCache, Matching
 from resdepth_colmap.matching.patch_match import MatchView, match_view
@@ -51,7 +51,7 @@ def matching_backend(requested: StereoBackend) -> StereoBackend:
 
 def initial_depth(
     scene: str,
-    case: DepthCase,
+    sample: DepthSample,
     backend: StereoBackend,
     config: StereoConfig,
     cache: MatchCache | None = None,
@@ -60,20 +60,20 @@ def initial_depth(
 
     Args:
         scene: Name of its scene, for the file in the cache.
-        case: The view; depth that it has already is taken.
+        sample: The view; depth that it has already is taken.
         backend: Who matches it otherwise, as `matching_backend` says.
         config: Options of the matcher.
         cache: Where matched depth is kept.
     """
-    if case.initial is not None:
-        return case.initial
-    views = (case.reference, *case.sources)
-    name = cache_name(scene, case.name, backend)
-    found = cache.find(name, views, case.depth_range, config) if cache else None
+    if sample.initial is not None:
+        return sample.initial
+    views = (sample.reference, *sample.sources)
+    name = cache_name(scene, sample.name, backend)
+    found = cache.find(name, views, sample.depth_range, config) if cache else None
     if found is None:
-        found = _match(views, case.depth_range, backend, config)
+        found = _match(views, sample.depth_range, backend, config)
         if cache:
-            cache.add(name, views, case.depth_range, config, found)
+            cache.add(name, views, sample.depth_range, config, found)
     return InitialDepth(
         depth=found.depth,
         origin=ORIGINS[backend],
@@ -82,9 +82,9 @@ def initial_depth(
     )
 
 
-def cache_name(scene: str, case: str, backend: StereoBackend) -> str:
+def cache_name(scene: str, sample: str, backend: StereoBackend) -> str:
     """What the file of a case in the cache begins with."""
-    return _UNSAFE.sub("_", f"{scene}-{case}-{backend}")
+    return _UNSAFE.sub("_", f"{scene}-{sample}-{backend}")
 
 
 def _match(

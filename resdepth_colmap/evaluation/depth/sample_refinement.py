@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from resdepth_colmap.config import RefineConfig
 from resdepth_colmap.evaluation.datasets.sample import (
-    DepthCase,
+    DepthSample,
     InitialDepth,
     source_from_reference,
 )
@@ -17,7 +17,7 @@ from resdepth_colmap.pipeline.refine.view import SourceView, ViewInputs, refine_
 from resdepth_colmap.scene import DepthMap, UnitColors
 
 
-class RefinedCase(NamedTuple):
+class RefinedSample(NamedTuple):
     """What became of a case.
 
     Attributes:
@@ -30,7 +30,7 @@ class RefinedCase(NamedTuple):
     cpu_s: float
 
 
-class _CaseView(NamedTuple):
+class _SampleView(NamedTuple):
     """One of a case's views; no depth = there is no map of it."""
 
     view: MatchView
@@ -38,22 +38,25 @@ class _CaseView(NamedTuple):
     colors: UnitColors | None
 
 
-def refine_case(
-    case: DepthCase, initial: InitialDepth, network: ResDepthNet, config: RefineConfig
-) -> RefinedCase:
+def refine_sample(
+    sample: DepthSample,
+    initial: InitialDepth,
+    network: ResDepthNet,
+    config: RefineConfig,
+) -> RefinedSample:
     """Refine the depth of a case's reference.
 
     In earlier rounds its sources are refined as far as the case shows what they look
     at: from each other and from the reference.
 
     Args:
-        case: The views.
+        sample: The views.
         initial: Depth of the reference, and of the sources where there is any.
         network: On the device to run on.
         config: Rounds, passes and tiles.
     """
-    views = _views(case, initial)
-    num_earlier = config.rounds - 1 if network.config.source_depth else 0
+    views = _views(sample, initial)
+    num_earlier = config.outer_iterations - 1 if network.config.source_depth else 0
 
     @functools.cache
     def map_of(index: int, num_rounds: int) -> DepthMap | None:
@@ -71,21 +74,21 @@ def refine_case(
     own = inputs(0, num_earlier)
     start = time.process_time()
     depth = refine_view(own, network, config).depth
-    return RefinedCase(depth, time.process_time() - start)
+    return RefinedSample(depth, time.process_time() - start)
 
 
-def _views(case: DepthCase, initial: InitialDepth) -> list[_CaseView]:
+def _views(sample: DepthSample, initial: InitialDepth) -> list[_SampleView]:
     """The reference first."""
-    found = [_CaseView(case.reference, initial.depth, case.colors)]
-    for place, source in enumerate(case.sources):
+    found = [_SampleView(sample.reference, initial.depth, sample.colors)]
+    for place, source in enumerate(sample.sources):
         depths = initial.source_depths[place : place + 1] or (None,)
-        colors = case.source_colors[place : place + 1] or (None,)
-        found.append(_CaseView(source, *depths, *colors))
+        colors = sample.source_colors[place : place + 1] or (None,)
+        found.append(_SampleView(source, *depths, *colors))
     return found
 
 
 def _inputs(
-    views: list[_CaseView], index: int, maps: dict[int, DepthMap | None]
+    views: list[_SampleView], index: int, maps: dict[int, DepthMap | None]
 ) -> ViewInputs:
     own = views[index]
     assert own.depth is not None  # noqa: S101 (asked only where it is there)

@@ -34,9 +34,9 @@ def depth_table(measured: Measured) -> str:
                 "scene | depth | MAE | RMSE | MedAE | off by > 1 % | off by > 2 % | "
                 "valid pixels | of",
                 [
-                    [name, label, *_error_cells(errors[arm])]
+                    [name, label, *_error_cells(errors[method])]
                     for name, errors in result_rows(measured)
-                    for arm, label in DEPTHS.items()
+                    for method, label in DEPTHS.items()
                 ],
                 num_texts=2,
             ),
@@ -56,10 +56,10 @@ def parts_table(measured: Measured) -> str:
         [
             name,
             label,
-            *(cell for part in _PARTS for cell in _part_cells(errors[part][arm])),
+            *(cell for part in _PARTS for cell in _part_cells(errors[part][method])),
         ]
         for name, errors in result_rows(measured)
-        for arm, label in DEPTHS.items()
+        for method, label in DEPTHS.items()
     ]
     return markdown_table(header, rows, num_texts=2)
 

@@ -34,8 +34,8 @@ def coverage(maps: ViewMaps) -> dict[str, Sums]:
     """How much of a view has a depth, by arm."""
     everywhere = np.ones(maps.shape)
     return {
-        arm: {"coverage": TileSums.of(depth > 0, everywhere)}
-        for arm, depth in maps.depths.items()
+        method: {"coverage": TileSums.of(depth > 0, everywhere)}
+        for method, depth in maps.depths.items()
     }
 
 
@@ -49,12 +49,12 @@ def against_truth(maps: ViewMaps, truth: DepthMap) -> dict[str, Sums]:
     known = truth > 0
     common = known & maps.common
     found: dict[str, Sums] = {}
-    for arm, depth in maps.depths.items():
-        found[arm] = {}
+    for method, depth in maps.depths.items():
+        found[method] = {}
         for name, tolerance in (("right_1", 0.01), ("right_2", 0.02)):
             right = (depth > 0) & (np.abs(depth - truth) <= tolerance * truth)
-            found[arm][name] = TileSums.of(right, known)
-            found[arm][f"{name}_common"] = TileSums.of(right, common)
+            found[method][name] = TileSums.of(right, known)
+            found[method][f"{name}_common"] = TileSums.of(right, common)
     return found
 
 
@@ -71,14 +71,14 @@ def sparse_points(maps: ViewMaps, points: SparsePoints) -> dict[str, Sums]:
     parity = points.ids[places[inside]] % 2
     common = maps.common.ravel()[pixels]
     found: dict[str, Sums] = {}
-    for arm, depth in maps.depths.items():
+    for method, depth in maps.depths.items():
         at_point = depth.ravel()[pixels]
         is_near = (at_point > 0) & (np.abs(at_point - z) <= WITHIN * z)
-        found[arm] = {}
+        found[method] = {}
         for half, name in enumerate(("points_even", "points_odd")):
             for suffix, kept in (("", parity == half), ("_common", common)):
                 counted = kept & (parity == half)
-                found[arm][name + suffix] = _sums_at(
+                found[method][name + suffix] = _sums_at(
                     pixels[counted], is_near[counted], maps.shape
                 )
     return found
@@ -92,19 +92,21 @@ def agreement(maps: ViewMaps, neighbours: Sequence[ViewMaps]) -> dict[str, Sums]
     step = max(1, round((maps.shape[0] * maps.shape[1] / MOST_LOOKED_UP) ** 0.5))
     everywhere = np.zeros(maps.shape, np.bool_)
     everywhere[step // 2 :: step, step // 2 :: step] = True
-    totals = {arm: _Agreement(maps.shape) for arm in maps.depths}
+    totals = {method: _Agreement(maps.shape) for method in maps.depths}
     for other in neighbours:
-        looked_up = {arm: _look_up(maps, other, arm, everywhere) for arm in totals}
+        looked_up = {
+            method: _look_up(maps, other, method, everywhere) for method in totals
+        }
         in_all = np.logical_and.reduce([seen for seen, _ in looked_up.values()])
-        for arm, (seen, agrees) in looked_up.items():
-            totals[arm].add(seen, agrees, in_all)
+        for method, (seen, agrees) in looked_up.items():
+            totals[method].add(seen, agrees, in_all)
     return {
-        arm: {
+        method: {
             "agreement": TileSums.of(total.num_agreeing, total.num_seen),
             "agreement_common": TileSums.of(total.num_agreeing_all, total.num_seen_all),
             "confirmed": TileSums.of(total.num_agreeing > 0, everywhere),
         }
-        for arm, total in totals.items()
+        for method, total in totals.items()
     }
 
 
@@ -128,17 +130,17 @@ class _Agreement:
 
 
 def _look_up(
-    maps: ViewMaps, other: ViewMaps, arm: str, asked: Flags
+    maps: ViewMaps, other: ViewMaps, method: str, asked: Flags
 ) -> tuple[Flags, Flags]:
     """Where a neighbour's map has a depth for a pixel, and where it is the same."""
-    depth = maps.depths[arm]
+    depth = maps.depths[method]
     row, column = np.nonzero(asked & (depth > 0))
     rays = pixel_rays(np.stack([column, row], axis=-1), maps.K)
     xyz = rays * depth[row, column, np.newaxis]
     xyz = transform(cam_from_cam(other.view, maps.view), xyz)
     xy, z = project(xyz, other.K)
     pixels, inside = _inside(xy, z, other.shape)
-    there = other.depths[arm].ravel()[pixels]
+    there = other.depths[method].ravel()[pixels]
     agrees = np.abs(there - z[inside]) <= WITHIN * there
     row, column = row[inside], column[inside]
     seen_map, agrees_map = np.zeros((2, *depth.shape), np.bool_)
@@ -180,6 +182,6 @@ def merged(parts: Sequence[Mapping[str, Sums]]) -> dict[str, Sums]:
     """The measures of several witnesses as one, by arm."""
     found: dict[str, Sums] = {}
     for part in parts:
-        for arm, sums in part.items():
-            found.setdefault(arm, {}).update(sums)
+        for method, sums in part.items():
+            found.setdefault(method, {}).update(sums)
     return found

@@ -26,21 +26,21 @@ def photo_agreement(maps: ViewMaps, photos: ViewInputs) -> dict[str, Sums]:
         photos: Its photo and those of its neighbours, at the size of the maps.
     """
     reference = torch.from_numpy(photos.gray)[None, None]
-    totals = {arm: torch.zeros(4, *maps.shape) for arm in maps.depths}
+    totals = {method: torch.zeros(4, *maps.shape) for method in maps.depths}
     for source in photos.sources:
         warped = _warped(maps, photos, source)
         in_all = torch.stack([inside for _, inside in warped.values()]).all(dim=0)
-        for arm, (image, inside) in warped.items():
+        for method, (image, inside) in warped.items():
             for place, counted in enumerate((inside, in_all)):
                 correlation = _correlation(reference, image, counted)
-                totals[arm][2 * place] += correlation
-                totals[arm][2 * place + 1] += counted[0, 0]
+                totals[method][2 * place] += correlation
+                totals[method][2 * place + 1] += counted[0, 0]
     return {
-        arm: {
+        method: {
             "photo": TileSums.of(total[0].numpy(), total[1].numpy()),
             "photo_common": TileSums.of(total[2].numpy(), total[3].numpy()),
         }
-        for arm, total in totals.items()
+        for method, total in totals.items()
     }
 
 
@@ -59,12 +59,12 @@ def _warped(
     )
     image = torch.from_numpy(source.gray)[None, None]
     return {
-        arm: warp_to_reference(
+        method: warp_to_reference(
             image,
             torch.from_numpy(invert_map(depth))[None, None],
             K,
             source_K,
             pose,
         )
-        for arm, depth in maps.depths.items()
+        for method, depth in maps.depths.items()
     }

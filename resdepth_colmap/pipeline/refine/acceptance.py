@@ -7,13 +7,13 @@ from torch import Tensor
 
 from resdepth_colmap.pipeline.refine.network_inputs import ViewTensors, seen_by_sources
 
-KEPT_CONSISTENCY = 0.15
+GATED_ERROR = 0.15
 """Photo-consistency (NCC of 0.7) up to which the photographs confirm a depth."""
 
 CONTRADICTING_CONSISTENCY = 0.05
 """The photographs contradict a change that makes them so much less consistent."""
 
-KEPT_CHANGE = 0.03
+GATED_CHANGE = 0.03
 """Relative change that is no correction of an outlier."""
 
 CONTRADICTED_ERRORS = (0.1, 0.5, 4.0)
@@ -24,7 +24,7 @@ of another view confirms it, where one does, and where several do: two maps that
 made from the same two photographs often share a mistake."""
 
 
-class KeptDepth(NamedTuple):
+class UpdateGate(NamedTuple):
     """What tells whether a change of the initial depth is taken.
 
     Attributes:
@@ -56,20 +56,20 @@ class KeptDepth(NamedTuple):
         changed = view._replace(inverse_depth=refined)
         after = seen_by_sources(changed, self.num_sources).consistency
         is_contradicted = after - self.consistency > CONTRADICTING_CONSISTENCY
-        num_confirming = torch.zeros_like(view.valid, dtype=torch.uint8)
-        if view.num_confirming is not None:
-            num_confirming = view.num_confirming
-        is_confirmed = num_confirming > 0
+        num_consistent = torch.zeros_like(view.valid, dtype=torch.uint8)
+        if view.num_consistent is not None:
+            num_consistent = view.num_consistent
+        is_consistent = num_consistent > 0
         if view.is_filtered:
             is_contradicted = is_contradicted | view.valid
-            is_supported = view.valid | is_confirmed
+            is_supported = view.valid | is_consistent
         else:
-            by_photographs = view.valid & (self.consistency < KEPT_CONSISTENCY)
-            is_supported = by_photographs | is_confirmed
-        relative = torch.where(is_supported & is_contradicted, KEPT_CHANGE, 0.0)
+            by_photographs = view.valid & (self.consistency < GATED_ERROR)
+            is_supported = by_photographs | is_consistent
+        relative = torch.where(is_supported & is_contradicted, GATED_CHANGE, 0.0)
         limit = relative * view.inverse_depth
         if error is not None:
             rows = error.new_tensor([OTHER_ERRORS, CONTRADICTED_ERRORS])
-            columns = num_confirming.long().clamp(max=len(OTHER_ERRORS) - 1)
+            columns = num_consistent.long().clamp(max=len(OTHER_ERRORS) - 1)
             limit = torch.maximum(limit, rows[is_contradicted.long(), columns] * error)
         return (refined - view.inverse_depth).abs() < limit

@@ -9,7 +9,7 @@ import numpy.typing as npt
 import torch
 
 from resdepth_colmap.geometry.completion import complete_from_background
-from resdepth_colmap.geometry.forward_warp import carry_inverse_depth
+from resdepth_colmap.geometry.forward_warp import reproject_inverse_depth
 from resdepth_colmap.geometry.inverse_depth import invert_map
 from resdepth_colmap.pipeline.refine.network_inputs import initial_maps
 from resdepth_colmap.scene import DepthMap, FloatMap, Matrix
@@ -20,8 +20,8 @@ FILTERED_SHARE = 0.95
 NUM_SOURCE_MAPS = 4
 """Other views whose maps are looked at."""
 
-CONFIRMING_CHANGE = 0.02
-CONFIRMING_PX = 1.0
+CONSISTENT_CHANGE = 0.02
+CONSISTENT_PX = 1.0
 """Another view's map confirms a depth that is off by less than that relatively, or by
 less than that in its image: with a short baseline, two percent are less than anyone can
 match (COLMAP's geometric consistency allows 1 px there and back)."""
@@ -29,7 +29,7 @@ match (COLMAP's geometric consistency allows 1 px there and back)."""
 
 Counts = npt.NDArray[np.uint8]
 
-LEAST_CONFIRMED_SHARE = 0.05
+LEAST_CONSISTENT_SHARE = 0.05
 """Maps that confirm less of a map are of another scene, or of failed pairs."""
 
 
@@ -53,19 +53,19 @@ class Start(NamedTuple):
 
     Attributes:
         inverse_depth: Complete, shape (H, W), float32, in 1/unit.
-        valid: Where it was measured, and confirmed if other maps were asked, shape (H,
-            W).
-        carried: What the maps of other views say, shape (H, W), float32, in 1/unit; 0 =
-            nothing. None = there are no maps that are of any use.
-        num_confirming: How many of them say the same as was measured, shape (H, W);
+        valid: Where it was measured, and consistent with another map if there are any,
+            shape (H, W).
+        reprojected: The maps of other views, reprojected, shape (H, W), float32, in
+            1/unit; 0 = nothing. None = there are no maps that are of any use.
+        num_consistent: How many of them say the same as was measured, shape (H, W);
             likewise.
         is_filtered: Whether the map has so many holes that it must have been filtered.
     """
 
     inverse_depth: FloatMap
     valid: npt.NDArray[np.bool_]
-    carried: FloatMap | None = None
-    num_confirming: Counts | None = None
+    reprojected: FloatMap | None = None
+    num_consistent: Counts | None = None
     is_filtered: bool = False
 
 
@@ -89,35 +89,35 @@ def start_from(depth: DepthMap, K: Matrix, maps: Sequence[SourceMap]) -> Start:
     alone = Start(filled, valid, is_filtered=is_filtered)
     if not maps:
         return alone
-    carried, counts = carried_depth(filled, K, maps)
-    num_confirming = np.where(valid, counts, np.uint8(0))
-    confirmed = num_confirming > 0
-    if confirmed.sum() < LEAST_CONFIRMED_SHARE * valid.sum():
+    reprojected, counts = reprojected_depth(filled, K, maps)
+    num_consistent = np.where(valid, counts, np.uint8(0))
+    consistent = num_consistent > 0
+    if consistent.sum() < LEAST_CONSISTENT_SHARE * valid.sum():
         return alone
     if is_filtered:
-        filled, _ = initial_maps(np.where(valid, depth, invert_map(carried)))
-        return Start(filled, valid, carried, num_confirming, is_filtered)
+        filled, _ = initial_maps(np.where(valid, depth, invert_map(reprojected)))
+        return Start(filled, valid, reprojected, num_consistent, is_filtered)
     along_rows = goes_along_rows(maps[0], K, depth.shape)
-    completed = complete_from_background(filled, confirmed, along_rows)
-    return Start(completed, confirmed, carried, num_confirming)
+    filled_in = complete_from_background(filled, consistent, along_rows)
+    return Start(filled_in, consistent, reprojected, num_consistent)
 
 
-class Carried(NamedTuple):
+class Reprojected(NamedTuple):
     """What maps of other views say of a view.
 
     Attributes:
         inverse_depth: Of several the one nearest to what is there, shape (H, W),
             float32, in 1/unit; 0 where no map says anything.
-        num_confirming: How many maps say the same as is there, shape (H, W).
+        num_consistent: How many maps say the same as is there, shape (H, W).
     """
 
     inverse_depth: FloatMap
-    num_confirming: Counts
+    num_consistent: Counts
 
 
-def carried_depth(
+def reprojected_depth(
     inverse_depth: FloatMap, K: Matrix, maps: Sequence[SourceMap]
-) -> Carried:
+) -> Reprojected:
     """Carry the maps of other views into a view and compare.
 
     Args:
@@ -127,9 +127,9 @@ def carried_depth(
     """
     height_px, width_px = inverse_depth.shape
     best = np.zeros_like(inverse_depth)
-    num_confirming = np.zeros(inverse_depth.shape, np.uint8)
+    num_consistent = np.zeros(inverse_depth.shape, np.uint8)
     for source in maps:
-        arrived = carry_inverse_depth(
+        arrived = reproject_inverse_depth(
             torch.from_numpy(invert_map(source.depth))[None, None],
             torch.from_numpy(source.K)[None],
             torch.from_numpy(K)[None],
@@ -139,15 +139,15 @@ def carried_depth(
         is_there, change = arrived > 0, np.abs(arrived - inverse_depth)
         is_nearer = (best == 0) | (change < np.abs(best - inverse_depth))
         best = np.where(is_there & is_nearer, arrived, best)
-        limit = np.maximum(CONFIRMING_CHANGE * inverse_depth, _of_pixels(source))
-        num_confirming += is_there & (change < limit)
-    return Carried(best, num_confirming)
+        limit = np.maximum(CONSISTENT_CHANGE * inverse_depth, _of_pixels(source))
+        num_consistent += is_there & (change < limit)
+    return Reprojected(best, num_consistent)
 
 
 def _of_pixels(source: SourceMap) -> float:
     """The change of inverse depth, in 1/unit, that moves a point `CONFIRMING_PX`."""
     baseline = float(np.linalg.norm(source.source_from_reference[:, 3]))
-    return CONFIRMING_PX / max(baseline * float(source.K[0, 0]), 1e-12)
+    return CONSISTENT_PX / max(baseline * float(source.K[0, 0]), 1e-12)
 
 
 def goes_along_rows(source: SourceMap, K: Matrix, size_px: tuple[int, int]) -> bool:

@@ -17,17 +17,17 @@ from resdepth_colmap.geometry.inverse_depth import invert_map
 from resdepth_colmap.geometry.warp import warp_to_reference
 from resdepth_colmap.network.network_config import (
     BLUE,
-    CARRIED,
-    CARRIED_CHANGE,
     RED,
+    REPROJECTED,
+    REPROJECTED_CHANGE,
     NetworkConfig,
     Normalisation,
 )
-from resdepth_colmap.network.unet import INPUT_LIMIT, Look
+from resdepth_colmap.network.unet import INPUT_LIMIT, SampleSource
 from resdepth_colmap.pipeline.refine.photometric_error import photo_consistency
 from resdepth_colmap.pipeline.refine.source_sampler import (
-    SecondLook,
     Sight,
+    SourceSampler,
     SourceTensors,
 )
 from resdepth_colmap.scene import DepthMap, FloatMap
@@ -48,9 +48,9 @@ class ViewTensors(NamedTuple):
         gray: Grey values of the reference in 0..1, shape (B, 1, H, W).
         K: K of the reference for index coordinates, shape (B, 3, 3), in pixels.
         sources: Second views, best first; may be empty.
-        carried: What the depth maps of other views say, shape (B, 1, H, W), in 1/unit;
-            0 = nothing. None = there are no such maps.
-        num_confirming: How many of these say the same as the initial depth, shape (B,
+        reprojected: The depth maps of other views, reprojected, shape (B, 1, H, W), in
+            1/unit; 0 = nothing. None = there are no such maps.
+        num_consistent: How many of these say the same as the initial depth, shape (B,
             1, H, W), uint8; likewise.
         colors: RGB values of the reference in 0..1, shape (B, 3, H, W); None = it is
             grey.
@@ -62,8 +62,8 @@ class ViewTensors(NamedTuple):
     gray: Tensor
     K: Tensor
     sources: tuple[SourceTensors, ...]
-    carried: Tensor | None = None
-    num_confirming: Tensor | None = None
+    reprojected: Tensor | None = None
+    num_consistent: Tensor | None = None
     colors: Tensor | None = None
     is_filtered: bool = False
 
@@ -77,26 +77,26 @@ class InputStack(NamedTuple):
         guidance: The channels of the network that follow "inverse_depth", in the order
             of `NetworkConfig.channels`, shape (B, C, H, W); C may be 0.
         baseline: Distance to the first source, shape (B, 1, 1, 1), in units.
-        second_look: Shows the first source at other depths than the initial one; None =
-            there is no source, or the network takes none.
+        source_sampler: Shows the first source at other depths than the initial one;
+            None = there is no source, or the network takes none.
     """
 
     inverse_depth: Tensor
     valid: Tensor
     guidance: Tensor
     baseline: Tensor
-    second_look: SecondLook | None = None
+    source_sampler: SourceSampler | None = None
 
     def crop(self, top_px: int, left_px: int, height_px: int, width_px: int) -> Self:
         """The same of a window of the view."""
-        look = self.second_look
+        sample_source = self.source_sampler
         rows = slice(top_px, top_px + height_px)
         columns = slice(left_px, left_px + width_px)
         return self._replace(
             inverse_depth=self.inverse_depth[..., rows, columns],
             valid=self.valid[..., rows, columns],
             guidance=self.guidance[..., rows, columns],
-            second_look=look and look.crop(top_px, left_px),
+            source_sampler=sample_source and sample_source.crop(top_px, left_px),
         )
 
 
@@ -180,7 +180,7 @@ def build_inputs(
             is_there = index < len(seen.warped)
             image = seen.warped[index][0] if is_there else torch.zeros_like(view.gray)
             channels[f"source_{index}"] = image
-    channels |= _carried_channels(view)
+    channels |= _reprojected_channels(view)
     names = [name for name in config.channels if name != "inverse_depth"]
     if not config.uses_sources:
         view = view._replace(sources=())
@@ -191,7 +191,7 @@ def build_inputs(
         valid=view.valid,
         guidance=guidance,
         baseline=_baseline(view),
-        second_look=_second_look(view),
+        source_sampler=_source_sampler(view),
     )
 
 
@@ -252,8 +252,8 @@ def network_input(stack: InputStack, config: NetworkConfig) -> tuple[Tensor, Sca
         return stack.guidance, scaling
     normalised = scaling.normalise(stack.inverse_depth)
     guidance = stack.guidance
-    if CARRIED_CHANGE in config.channels:
-        place = config.channels.index(CARRIED_CHANGE) - 1
+    if REPROJECTED_CHANGE in config.channels:
+        place = config.channels.index(REPROJECTED_CHANGE) - 1
         change = guidance[:, place : place + 1] * stack.inverse_depth / scaling.scale
         change = change.clamp(-INPUT_LIMIT, INPUT_LIMIT)
         after = guidance[:, place + 1 :]
@@ -261,24 +261,24 @@ def network_input(stack: InputStack, config: NetworkConfig) -> tuple[Tensor, Sca
     return torch.cat([normalised, guidance], dim=1), scaling
 
 
-def scaled_look(stack: InputStack, scaling: Scaling) -> Look | None:
+def scaled_sampler(stack: InputStack, scaling: Scaling) -> SampleSource | None:
     """What a network that looks again is given, besides `network_input`.
 
     Args:
         stack: The tile, or a batch of tiles.
         scaling: Of the same.
     """
-    if stack.second_look is None:
+    if stack.source_sampler is None:
         return None
-    gray_at = stack.second_look.gray_at
+    gray_at = stack.source_sampler.gray_at
     return lambda normalised: gray_at(scaling.restore(normalised))
 
 
-def _second_look(view: ViewTensors) -> SecondLook | None:
+def _source_sampler(view: ViewTensors) -> SourceSampler | None:
     if not view.sources:
         return None
     source = view.sources[0]
-    return SecondLook(
+    return SourceSampler(
         tuple(Sight(K, source.item(place)) for place, K in enumerate(view.K))
     )
 
@@ -290,15 +290,15 @@ def _color_channels(view: ViewTensors) -> dict[str, Tensor]:
     return {RED: view.colors[:, 0:1], BLUE: view.colors[:, 2:3]}
 
 
-def _carried_channels(view: ViewTensors) -> dict[str, Tensor]:
+def _reprojected_channels(view: ViewTensors) -> dict[str, Tensor]:
     """Relative difference of what the maps say, and where they say anything."""
-    if view.carried is None:
+    if view.reprojected is None:
         nothing = torch.zeros_like(view.gray)
-        return {CARRIED_CHANGE: nothing, CARRIED: nothing}
-    is_there = view.carried > 0
-    change = view.carried / view.inverse_depth - 1.0
+        return {REPROJECTED_CHANGE: nothing, REPROJECTED: nothing}
+    is_there = view.reprojected > 0
+    change = view.reprojected / view.inverse_depth - 1.0
     change = torch.where(is_there, change, 0.0).clamp(max=LARGEST_CHANGE)
-    return {CARRIED_CHANGE: change, CARRIED: is_there.to(view.gray.dtype)}
+    return {REPROJECTED_CHANGE: change, REPROJECTED: is_there.to(view.gray.dtype)}
 
 
 def _baseline(view: ViewTensors) -> Tensor:

@@ -72,7 +72,7 @@ class Sight(NamedTuple):
         return warped[:, 0]
 
 
-class SecondLook(NamedTuple):
+class SourceSampler(NamedTuple):
     """What the first sources of a batch of tiles show, at any depth.
 
     Attributes:

@@ -90,8 +90,8 @@ def refine_workspace(
         "device": str(device),
     }
     options = {
-        "passes": config.passes,
-        "keep_confirmed": config.keep_confirmed,
+        "inner_iterations": config.inner_iterations,
+        "update_gating": config.update_gating,
         "tile_px": config.tile_px,
         "overlap_px": config.overlap_px,
         "weights": facts["weights_sha256"],
@@ -102,7 +102,7 @@ def refine_workspace(
     plans, skipped = plan_views(
         workspace, scene, config.input, (num_sources, num_maps), options
     )
-    plans = with_rounds(plans, config.rounds if num_maps else 1)
+    plans = with_rounds(plans, config.outer_iterations if num_maps else 1)
     output = OutputWorkspace(source=workspace, in_place=in_place)
     output.prepare([view.name for view in scene.views])
     loop = RefineLoop(workspace, scene, config, network, output)

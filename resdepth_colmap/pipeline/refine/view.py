@@ -14,14 +14,14 @@ from resdepth_colmap.config import RefineConfig
 from resdepth_colmap.geometry.inverse_depth import invert_map
 from resdepth_colmap.geometry.normals import normals_from_depth
 from resdepth_colmap.network.unet import ResDepthNet
-from resdepth_colmap.pipeline.refine.acceptance import KeptDepth
+from resdepth_colmap.pipeline.refine.acceptance import UpdateGate
 from resdepth_colmap.pipeline.refine.cross_view import SourceMap, start_from
 from resdepth_colmap.pipeline.refine.network_inputs import (
     InputStack,
     ViewTensors,
     build_inputs,
     network_input,
-    scaled_look,
+    scaled_sampler,
     seen_by_sources,
 )
 from resdepth_colmap.pipeline.refine.source_sampler import SourceTensors
@@ -146,16 +146,16 @@ def refine_view(
         initial = tensors.inverse_depth
         num_sources = network.config.num_sources
         seen = seen_by_sources(tensors, num_sources)
-        kept_depth = KeptDepth(tensors, num_sources, seen.consistency)
-        for number in range(config.passes):
+        gate = UpdateGate(tensors, num_sources, seen.consistency)
+        for number in range(config.inner_iterations):
             if number > 0:
                 seen = seen_by_sources(tensors, num_sources)
             stack = build_inputs(tensors, network.config, seen)
             outputs = _run_tiled(stack, network, config).to(device)[None]
             refined = (tensors.inverse_depth + outputs[:, :1]).clamp(low, high)
             error = outputs[:, 1:2] if network.config.confidence else None
-            if config.keep_confirmed:
-                is_kept = kept_depth.is_kept(refined, error)
+            if config.update_gating:
+                is_kept = gate.is_kept(refined, error)
                 refined = torch.where(is_kept, initial, refined)
             tensors = tensors._replace(inverse_depth=refined)
         if error is not None:
@@ -203,7 +203,7 @@ def _refine_tile(tile: InputStack, network: ResDepthNet) -> Tensor:
     channels, scaling = network_input(tile, network.config)
     padded = pad_to_multiple(channels, network.config.multiple_px)
     padded = padded.contiguous(memory_format=torch.channels_last)
-    output = network(padded, scaled_look(tile, scaling))
+    output = network(padded, scaled_sampler(tile, scaling))
     height_px, width_px = channels.shape[-2:]
     refined = output.inverse_depth[..., :height_px, :width_px]
     if network.config.residual:
@@ -245,8 +245,8 @@ def view_tensors(view: ViewInputs, device: torch.device, use_maps: bool) -> View
             )
             for source in view.sources
         ),
-        carried=_map(start.carried, device),
-        num_confirming=_map(start.num_confirming, device),
+        reprojected=_map(start.reprojected, device),
+        num_consistent=_map(start.num_consistent, device),
         is_filtered=start.is_filtered,
     )
 

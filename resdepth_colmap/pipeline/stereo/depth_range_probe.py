@@ -32,7 +32,7 @@ FAR_STRETCH = 4.0
 small picture, and costs little: the search is uniform in inverse depth."""
 
 
-def sketched_range(
+def probed_range(
     reference: MatchView,
     sources: Sequence[MatchView],
     wide_range: tuple[float, float],
@@ -57,10 +57,10 @@ def sketched_range(
     )
     found = match_view(reference, sources, wide_range, config)
     depth = filter_result(found, reference, sources, None, config).surface.depth
-    confirmed = depth[depth > 0]
-    if confirmed.size < LEAST_SHARE * depth.size:
+    consistent = depth[depth > 0]
+    if consistent.size < LEAST_SHARE * depth.size:
         return wide_range
-    near, far = (float(value) for value in np.percentile(confirmed, PERCENTILES))
+    near, far = (float(value) for value in np.percentile(consistent, PERCENTILES))
     return (
         max(near / NEAR_STRETCH, wide_range[0]),
         min(far * FAR_STRETCH, wide_range[1]),

@@ -26,7 +26,7 @@ from resdepth_colmap.matching.patch_match import MatchView, Surface, match_view
 from resdepth_colmap.pipeline.stereo.depth_range_probe import (
     SIDE_PX,
     WIDE,
-    sketched_range,
+    probed_range,
 )
 from resdepth_colmap.pipeline.stereo.ledger import (
     GEOMETRIC,
@@ -84,7 +84,7 @@ class ViewMatcher:
         self.ledger = ledger
         num_bytes = int(min(config.cache_size, 1 << 20) * BYTES_PER_GB)
         self.images = ViewImages(workspace, num_bytes)
-        self._sketched: dict[int, tuple[float, float]] = {}
+        self._probed: dict[int, tuple[float, float]] = {}
 
     def match(self, plan: StereoPlan, which: StereoPass, advance: Advance) -> str:
         """Match a view and write its maps.
@@ -198,11 +198,11 @@ class ViewMatcher:
         near, far = plan.depth_range
         if not plan.is_guess or far <= WIDE * near:
             return near, far
-        if plan.index not in self._sketched:
+        if plan.index not in self._probed:
             views = self._match_views(plan, SIDE_PX)
-            limits = sketched_range(*views, plan.depth_range, self.config)
-            self._sketched[plan.index] = limits
-        return self._sketched[plan.index]
+            limits = probed_range(*views, plan.depth_range, self.config)
+            self._probed[plan.index] = limits
+        return self._probed[plan.index]
 
     def _match_views(
         self, plan: StereoPlan, max_image_size: int

@@ -22,14 +22,14 @@ from resdepth_colmap.pipeline.refine.network_inputs import (
     network_input,
 )
 from resdepth_colmap.pipeline.refine.source_sampler import (
-    SecondLook,
     Sight,
+    SourceSampler,
     SourceTensors,
 )
 from resdepth_colmap.training.data.samples import (
     AGAIN,
-    COMPLETED,
     DENSE,
+    FILLED,
     HOLES,
     Sample,
     guidance_names,
@@ -53,7 +53,7 @@ class Batch(NamedTuple):
         target: True inverse depth, normalised as the input is, shape (B, 1, H, W).
         known: Where there is truth, shape (B, 1, H, W), bool.
         scaling: How that was done.
-        second_look: Shows the first sources at other depths.
+        source_sampler: Shows the first sources at other depths.
         importance: How much each pixel counts, shape (B, 1, H, W), 1 in the mean.
         names: Names of the samples of all processes, for the message when a loss is
             not a number.
@@ -63,7 +63,7 @@ class Batch(NamedTuple):
     target: Tensor
     known: Tensor
     scaling: Scaling
-    second_look: SecondLook
+    source_sampler: SourceSampler
     importance: Tensor
     names: tuple[str, ...]
 
@@ -74,14 +74,14 @@ class Batch(NamedTuple):
             target=self.target.to(device),
             known=self.known.to(device),
             scaling=Scaling(*(values.to(device) for values in self.scaling)),
-            second_look=self.second_look.to(device),
+            source_sampler=self.source_sampler.to(device),
             importance=self.importance.to(device),
             names=self.names,
         )
 
-    def look(self, normalised: Tensor) -> Tensor:
+    def sample_source(self, normalised: Tensor) -> Tensor:
         """The first sources at these inverse depths (`network.unet.Look`)."""
-        return self.second_look.gray_at(self.scaling.restore(normalised))
+        return self.source_sampler.gray_at(self.scaling.restore(normalised))
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -138,7 +138,7 @@ class CropSampler:
             target=scaling.normalise(target),
             known=known,
             scaling=scaling,
-            second_look=SecondLook(tuple(_sight(crop) for crop in crops)),
+            source_sampler=SourceSampler(tuple(_sight(crop) for crop in crops)),
             importance=self._importance(stack.valid),
             names=tuple(path.stem for path, _ in draws),
         )
@@ -154,7 +154,7 @@ class CropSampler:
         """The samples by the end of their names."""
         return {
             end: tuple(path for path in self.paths if path.stem.endswith(end))
-            for end in (DENSE, COMPLETED, AGAIN, HOLES)
+            for end in (DENSE, FILLED, AGAIN, HOLES)
         }
 
     @functools.cached_property
@@ -171,7 +171,7 @@ class CropSampler:
     def _draw(self, step: int, item: int) -> tuple[Path, np.random.Generator]:
         """A sample, and what decides on its crop: the same in every process."""
         rng = np.random.default_rng((self.seed, step, item))
-        own = COMPLETED if self.config.source_depth else DENSE
+        own = FILLED if self.config.source_depth else DENSE
         again = AGAIN if self.config.source_depth else DENSE
         lot = (rng.random() - self.holes_share) / max(1.0 - self.holes_share, 1e-9)
         kinds = [own, DENSE, HOLES]

@@ -34,7 +34,7 @@ from resdepth_colmap.training.data.labelled_views import (
 HOLES_CONSISTENCY = 0.25
 """Photo-consistency above which the copy "with holes" of a map has none."""
 
-DENSE, COMPLETED, AGAIN, HOLES = "-dense", "-completed", "-again", "-holes"
+DENSE, FILLED, AGAIN, HOLES = "-dense", "-completed", "-again", "-holes"
 """How the names of samples end: of a map without holes, of one that the maps of other
 views have been compared with, of one that their refined maps have been, and of a map
 with holes."""
@@ -187,7 +187,7 @@ def sample_size(path: Path) -> tuple[int, int]:
 
 
 def _prepare_view(view: LabelledView, num_sources: int, folder: Path) -> list[Path]:
-    ends = (DENSE, COMPLETED, HOLES)
+    ends = (DENSE, FILLED, HOLES)
     paths = {end: sample_path(view, folder, end) for end in ends}
     if not paths[HOLES].exists():  # written last
         loaded = view.load(num_sources)
@@ -204,7 +204,7 @@ def _samples(loaded: Loaded, num_sources: int) -> Iterator[tuple[str, Sample]]:
         return
     yield DENSE, dense
     if loaded.inputs.source_maps:
-        yield COMPLETED, build_sample(loaded, num_sources)
+        yield FILLED, build_sample(loaded, num_sources)
     depth = _with_holes(loaded.inputs.depth, dense, num_sources)
     if depth is not None:
         # The maps of other views would have to be filtered like it.

@@ -78,10 +78,10 @@ def prepare_data(
 
     def samples_of(part: Sequence[Path]) -> tuple[Path, ...]:
         paths = prepare_samples(part, network_config, cache, progress)
-        if config.rounds > 1 and config.init is not None:
+        if config.outer_iterations > 1 and config.init is not None:
             weights = init_path(config.init)
             paths += prepare_later_rounds(
-                part, network_config, cache, weights, config.rounds, progress
+                part, network_config, cache, weights, config.outer_iterations, progress
             )
         return tuple(paths)
 

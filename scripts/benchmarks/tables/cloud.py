@@ -17,15 +17,15 @@ SCORES = ("accuracy", "completeness", "f1")
 
 def cloud_table(measured: Mapping[str, Any]) -> str:
     """Each score of each case and tolerance, official and ours; seconds and memory."""
-    cases = measured["cases"]
+    samples = measured["samples"]
     names = ("accuracy", "completeness", "F1")
     header = " | ".join(
         ["case | tolerance, m", *(f"{n}: official | ours" for n in names)]
     )
     rows = [
-        _row(name, case, index)
-        for name, case in cases.items()
-        for index in range(len(case["tolerances"]))
+        _row(name, sample, index)
+        for name, sample in samples.items()
+        for index in range(len(sample["tolerances"]))
     ]
     sizes = [
         [
@@ -57,18 +57,18 @@ def largest_difference(measured: Mapping[str, Any]) -> float:
     """Of all scores of all cases, between the official program and ours, in 0..1."""
     differences: list[float] = [
         abs(official - ours)
-        for case in measured["cases"].values()
+        for sample in measured["samples"].values()
         for name in SCORES
         for official, ours in zip(
-            case["official"][name], case["ours"][name], strict=True
+            sample["official"][name], sample["ours"][name], strict=True
         )
     ]
     return max(differences)
 
 
-def _row(name: str, case: Mapping[str, Any], index: int) -> list[str]:
+def _row(name: str, sample: Mapping[str, Any], index: int) -> list[str]:
     shares = [
-        case[who][score][index] for score in SCORES for who in ("official", "ours")
+        sample[who][score][index] for score in SCORES for who in ("official", "ours")
     ]
     cells = [percent(share, digits=3) for share in shares]
-    return [name.replace("_", " "), f"{case['tolerances'][index]:g}", *cells]
+    return [name.replace("_", " "), f"{sample['tolerances'][index]:g}", *cells]

@@ -68,7 +68,7 @@ def score_gains(result: Measured, fuser: str) -> Iterator[dict[str, float]]:
     clouds = result["clouds"][fuser]
     if REFERENCE not in clouds:
         return
-    refined, before = (clouds[arm]["scores"] for arm in ("refined", REFERENCE))
+    refined, before = (clouds[method]["scores"] for method in ("refined", REFERENCE))
     if refined is None or before is None:
         return
     for place, tolerance in enumerate(refined["tolerances"]):
@@ -108,9 +108,9 @@ def _settings(fusion: Measured) -> str:
 
 
 def _cloud_rows(name: str, result: Measured) -> Iterator[list[str]]:
-    for fuser, arms in result["clouds"].items():
-        for arm, cloud in arms.items():
-            head = [name, FUSERS[fuser], arm, count(cloud["num_points"])]
+    for fuser, methods in result["clouds"].items():
+        for method, cloud in methods.items():
+            head = [name, FUSERS[fuser], method, count(cloud["num_points"])]
             scores = cloud["scores"]
             if scores is None:
                 yield [*head, *[NOT_KNOWN] * 4]
@@ -123,13 +123,15 @@ def _cloud_rows(name: str, result: Measured) -> Iterator[list[str]]:
 
 
 def _paired_rows(name: str, result: Measured) -> Iterator[list[str]]:
-    arms = ("filtered", "unfiltered", "refined")
+    methods = ("filtered", "unfiltered", "refined")
     for pair, differences in result["paired"].items():
         for measure, paired in differences.items():
             views = paired["views"]
             if views["mean"] is None:
                 continue
-            means = [result["measures"].get(arm, {}).get(measure) for arm in arms]
+            means = [
+                result["measures"].get(method, {}).get(measure) for method in methods
+            ]
             low, high = views["interval"] or (None, None)
             yield [
                 name,
@@ -150,8 +152,8 @@ def _cost_rows(name: str, result: Measured) -> Iterator[list[str]]:
 
 def _notes(result: Measured) -> list[str]:
     said = dict.fromkeys(result["notes"])
-    for fuser, arms in result["clouds"].items():
-        for cloud in arms.values():
+    for fuser, methods in result["clouds"].items():
+        for cloud in methods.values():
             if cloud["note"]:
                 said[f"{FUSERS[fuser]} fusion: {cloud['note']}."] = None
     return list(said)

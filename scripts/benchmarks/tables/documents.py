@@ -24,7 +24,7 @@ from scripts.benchmarks.tables.model_card import training_table, weights_table
 from scripts.benchmarks.tables.stereo_memory import stereo_memory_table
 from scripts.benchmarks.tables.variants import beyond_table, variants_table
 
-ARMS = ("unfiltered", "refined")
+METHODS = ("unfiltered", "refined")
 
 
 def middlebury_table(measured: Measured) -> str:
@@ -86,11 +86,11 @@ def agreement_table(measured: Measured) -> str:
     limits = {"within_1": "1 %", "within_2": "2 %", "within_5": "5 %"}
     rows = [
         [name, percent(image["known"])]
-        + [percent(image[arm][key]) for key in limits for arm in ARMS]
+        + [percent(image[method][key]) for key in limits for method in METHODS]
         for name, image in measured["images"].items()
     ]
     header = "image | filled in COLMAP's filtered map | " + " | ".join(
-        f"within {limit}: {arm}" for limit in limits.values() for arm in ARMS
+        f"within {limit}: {method}" for limit in limits.values() for method in METHODS
     )
     return "\n\n".join([markdown_table(header, rows), _measured_by(measured)])
 
@@ -98,14 +98,14 @@ def agreement_table(measured: Measured) -> str:
 def workspaces_table(measured: Measured) -> str:
     """Seconds a stage, memory, and what there was before and after."""
     stages = list(
-        dict.fromkeys(s for case in measured.values() for s in case["seconds"])
+        dict.fromkeys(s for sample in measured.values() for s in sample["seconds"])
     )
     header = (
         " | ".join(["workspace", "options", "images", *map(_spoken, stages)])
         + " | in all, s | peak memory | points before | points after"
         + " | filled before | filled after | date"
     )
-    rows = [_workspace_row(name, case, stages) for name, case in measured.items()]
+    rows = [_workspace_row(name, sample, stages) for name, sample in measured.items()]
     command = "python -m scripts.benchmarks.workspaces"
     return "\n\n".join(
         [
@@ -225,18 +225,18 @@ def _summary_row(name: str, errors: Mapping[str, Measured]) -> list[str]:
     return [name, *maes, *bad]
 
 
-def _workspace_row(name: str, case: Measured, stages: list[str]) -> list[str]:
-    memory_mb = case["peak_memory_mb"]
+def _workspace_row(name: str, sample: Measured, stages: list[str]) -> list[str]:
+    memory_mb = sample["peak_memory_mb"]
     return [
         name,
-        f"`{' '.join(case['options'])}`" if case["options"] else "",
-        str(case["num_images"]),
-        *[number(case["seconds"].get(stage), digits=1) for stage in stages],
-        number(case["seconds_in_all"], digits=1),
+        f"`{' '.join(sample['options'])}`" if sample["options"] else "",
+        str(sample["num_images"]),
+        *[number(sample["seconds"].get(stage), digits=1) for stage in stages],
+        number(sample["seconds_in_all"], digits=1),
         NOT_KNOWN if memory_mb is None else f"{memory_mb / 1024:.1f} GiB",
-        *[count(case[key]) for key in ("points_before", "points_after")],
-        *[percent(case[key], 0) for key in ("filled_before", "filled_after")],
-        case.get("date", NOT_KNOWN),
+        *[count(sample[key]) for key in ("points_before", "points_after")],
+        *[percent(sample[key], 0) for key in ("filled_before", "filled_after")],
+        sample.get("date", NOT_KNOWN),
     ]
 
 
@@ -269,7 +269,7 @@ def _ratio_sentence(measured: Measured) -> str:
 
 
 def _times(options: Measured) -> str:
-    passes, rounds = options["passes"], options.get("rounds", 1)
+    passes, rounds = options["inner_iterations"], options.get("outer_iterations", 1)
     said = f"{passes} {'pass' if passes == 1 else 'passes'}"
     return said if rounds == 1 else f"{rounds} rounds of {said}"
 

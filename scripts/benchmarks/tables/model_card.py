@@ -14,8 +14,8 @@ CHANNELS = {
     "source_0": "the second photo, warped onto that depth",
     "valid": "which depth was measured, not filled",
     "photo_consistency": "how well the two photos agree (7 x 7 correlation)",
-    "carried_change": "where the depth maps of other views differ",
-    "carried": "where any of these says something",
+    "reprojected_change": "where the depth maps of other views differ",
+    "reprojected": "where any of these says something",
     "red": "the photo's red",
     "blue": "and blue",
 }
@@ -49,7 +49,9 @@ def _second_network(network: Mapping[str, Any]) -> str:
     if not channels:
         return ""
     seen = " sees the first one's features," if network["shared_features"] else ""
-    again = " looks at the second photo again and" if network["second_look"] else ""
+    again = (
+        " looks at the second photo again and" if network["source_resampling"] else ""
+    )
     return (
         f", those of a second, small one among them ({channels} channels at half the "
         f"resolution), which{seen}{again} mixes each pixel's depth from those around it"

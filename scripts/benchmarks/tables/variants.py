@@ -6,7 +6,7 @@ from typing import Any
 
 from resdepth_colmap.evaluation.markdown import markdown_table, number, percent
 
-ARMS = {
+METHODS = {
     "unfiltered": "unfiltered PatchMatch",
     "median": "5 x 5 median",
     "unet_stereo": "Unet-stereo (images only)",
@@ -70,12 +70,15 @@ def beyond_table(measured: Mapping[str, Any]) -> str:
         for place, label in enumerate(("MAE ratio", "MedAE ratio", "off by > 2 %"))
     ]
     rows = [
-        [label, *(cell for it in sets.values() for cell in _ratios(it["arms"][name]))]
+        [
+            label,
+            *(cell for it in sets.values() for cell in _ratios(it["methods"][name])),
+        ]
         for name, label in BEYOND.items()
-        if all(name in result["arms"] for result in sets.values())
+        if all(name in result["methods"] for result in sets.values())
     ]
     table = markdown_table(" | ".join(["network", *columns]), rows)
-    told = [_changes(SETS[key], result["arms"]) for key, result in sets.items()]
+    told = [_changes(SETS[key], result["methods"]) for key, result in sets.items()]
     return "\n\n".join([_measured_by(measured), table, *told])
 
 
@@ -94,15 +97,15 @@ def out_of_order(maes: Mapping[str, float]) -> list[tuple[str, str]]:
     ]
 
 
-def _changes(label: str, arms: Mapping[str, Any]) -> str:
+def _changes(label: str, methods: Mapping[str, Any]) -> str:
     """Which additions changed a ratio, each against the row before it."""
-    names = [name for name in BEYOND if name in arms and name != "unfiltered"]
+    names = [name for name in BEYOND if name in methods and name != "unfiltered"]
     told = []
     for key, measure in (("mae_ratio", "MAE"), ("medae_ratio", "MedAE")):
         better: list[str] = []
         worse: list[str] = []
         for before, name in itertools.pairwise(names):
-            change = arms[name][key] - arms[before][key]
+            change = methods[name][key] - methods[before][key]
             if abs(change) >= LEAST_CHANGE:
                 kind = better if change < 0 else worse
                 kind.append(f"{BEYOND[name].removeprefix('+ ')} ({change:+.2f})")
@@ -129,16 +132,18 @@ def _measured_by(measured: Mapping[str, Any]) -> str:
 
 
 def _set_parts(label: str, result: Mapping[str, Any]) -> Sequence[str]:
-    arms = result["arms"]
-    rows = [[ARMS[name], *_cells(arms[name])] for name in ARMS if name in arms]
+    methods = result["methods"]
+    rows = [
+        [METHODS[name], *_cells(methods[name])] for name in METHODS if name in methods
+    ]
     header = (
         "variant | MAE, m | RMSE, m | MedAE, mm | off by > 2 % | "
         "MAE ratio | MedAE ratio"
     )
-    swapped = out_of_order({name: arm["mae"] for name, arm in arms.items()})
+    swapped = out_of_order({name: method["mae"] for name, method in methods.items()})
     order = "The order is the paper's."
     if swapped:
-        pairs = "; ".join(f"{ARMS[a]} beats {ARMS[b]}" for a, b in swapped)
+        pairs = "; ".join(f"{METHODS[a]} beats {METHODS[b]}" for a, b in swapped)
         order = f"Unlike in the paper: {pairs}."
     return [
         f"{label.capitalize()}, {result['num_views']} views:",
@@ -147,20 +152,20 @@ def _set_parts(label: str, result: Mapping[str, Any]) -> Sequence[str]:
     ]
 
 
-def _cells(arm: Mapping[str, Any]) -> list[str]:
+def _cells(method: Mapping[str, Any]) -> list[str]:
     return [
-        number(arm["mae"]),
-        number(arm["rmse"]),
-        number(arm["medae"], scale=1000, digits=1),
-        percent(arm["bad_2"]),
-        number(arm["mae_ratio"], digits=2),
-        number(arm["medae_ratio"], digits=2),
+        number(method["mae"]),
+        number(method["rmse"]),
+        number(method["medae"], scale=1000, digits=1),
+        percent(method["bad_2"]),
+        number(method["mae_ratio"], digits=2),
+        number(method["medae_ratio"], digits=2),
     ]
 
 
-def _ratios(arm: Mapping[str, Any]) -> list[str]:
+def _ratios(method: Mapping[str, Any]) -> list[str]:
     return [
-        number(arm["mae_ratio"], digits=2),
-        number(arm["medae_ratio"], digits=2),
-        percent(arm["bad_2"]),
+        number(method["mae_ratio"], digits=2),
+        number(method["medae_ratio"], digits=2),
+        percent(method["bad_2"]),
     ]

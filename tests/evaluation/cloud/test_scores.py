@@ -43,11 +43,11 @@ def noisy(scan: PlacedScan, sigma_m: float = 0.02) -> Points:
     return towards(scan, 1 + rng.normal(0, sigma_m, distances.shape) / distances)
 
 
-@pytest.mark.parametrize("case", OFFICIAL_CASES)
+@pytest.mark.parametrize("sample", OFFICIAL_CASES)
 def test_scores_are_those_of_the_official_program(
-    shared_data: Callable[[str], Path], case: str
+    shared_data: Callable[[str], Path], sample: str
 ) -> None:
-    folder = shared_data("eth3d_cloud_cases") / case
+    folder = shared_data("eth3d_cloud_cases") / sample
     scores = score_cloud_file(
         folder / "reconstruction.ply", folder / "scan_alignment.mlp", CloudConfig()
     )

@@ -12,13 +12,13 @@ from eth3d_scene import (
     write_eth3d_scene,
 )
 from scipy.ndimage import maximum_filter, minimum_filter
-from warped_cases import difference_when_warped
+from warped_samples import difference_when_warped
 
 from resdepth_colmap.config import StereoConfig
 from resdepth_colmap.evaluation.datasets.eth3d import Eth3dOptions, eth3d_sources
 from resdepth_colmap.evaluation.datasets.eth3d_truth import undistorted_truth
 from resdepth_colmap.evaluation.datasets.paper import PAPER_IMAGE_WIDTH_PX
-from resdepth_colmap.evaluation.datasets.sample import CaseOptions
+from resdepth_colmap.evaluation.datasets.sample import SampleOptions
 from resdepth_colmap.geometry.pixels import index_K
 from resdepth_colmap.geometry.projection import project
 from resdepth_colmap.io.colmap.model import read_scene
@@ -124,14 +124,14 @@ def test_the_files_are_read_where_they_are(rendered: RenderedEth3d) -> None:
     assert files.image_path(view_of(files, 0).name).is_file()
 
 
-OPTIONS = CaseOptions(stereo=StereoConfig(), num_sources=1)
+OPTIONS = SampleOptions(stereo=StereoConfig(), num_sources=1)
 
 
 def test_the_truth_carries_one_image_into_the_other(rendered: RenderedEth3d) -> None:
     (scene,) = eth3d_sources(rendered.path.parent, Eth3dOptions())
-    case = scene.read(OPTIONS)[0]()
-    right = difference_when_warped(case)
-    assert right < 0.5 * difference_when_warped(case, 1.05)
+    sample = scene.read(OPTIONS)[0]()
+    right = difference_when_warped(sample)
+    assert right < 0.5 * difference_when_warped(sample, 1.05)
 
 
 @pytest.mark.data
@@ -141,8 +141,8 @@ def test_the_real_truth_carries_one_photo_into_the_other() -> None:
         pytest.skip("no scenes of ETH3D (set RESDEPTH_ETH3D to their folder)")
     for scene in eth3d_sources(Path(root), Eth3dOptions(num_pairs=1)):
         (load,) = scene.read(OPTIONS)
-        case = load()
-        assert max(case.truth.shape) == PAPER_IMAGE_WIDTH_PX
-        assert (case.truth > 0).mean() > 0.2
-        right = difference_when_warped(case)
-        assert right < 0.9 * difference_when_warped(case, 1.05), scene.name
+        sample = load()
+        assert max(sample.truth.shape) == PAPER_IMAGE_WIDTH_PX
+        assert (sample.truth > 0).mean() > 0.2
+        right = difference_when_warped(sample)
+        assert right < 0.9 * difference_when_warped(sample, 1.05), scene.name

@@ -14,7 +14,7 @@ from stereo_pairs import (
     write_as_distributed,
     write_stereo_pair,
 )
-from warped_cases import difference_when_warped
+from warped_samples import difference_when_warped
 
 from resdepth_colmap.config import StereoConfig
 from resdepth_colmap.errors import WorkspaceError
@@ -22,32 +22,32 @@ from resdepth_colmap.evaluation.datasets.middlebury import (
     depth_from_disparity,
     is_middlebury_scene,
     read_calibration,
-    read_middlebury_case,
+    read_middlebury_sample,
 )
-from resdepth_colmap.evaluation.datasets.sample import CaseOptions, DepthCase
+from resdepth_colmap.evaluation.datasets.sample import DepthSample, SampleOptions
 
-OPTIONS = CaseOptions(stereo=StereoConfig(), num_sources=1)
+OPTIONS = SampleOptions(stereo=StereoConfig(), num_sources=1)
 
 
-def read_case(path: Path) -> DepthCase:
-    return read_middlebury_case(path, OPTIONS)
+def read_sample(path: Path) -> DepthSample:
+    return read_middlebury_sample(path, OPTIONS)
 
 
 def test_what_is_distributed_is_read(tmp_path: Path) -> None:
     truth = write_as_distributed(tmp_path / "Plane")
-    case = read_case(tmp_path / "Plane")
-    assert np.allclose(case.truth, truth, rtol=1e-5)
-    assert not case.truth[0].any()  # infinite disparity: not known
-    assert case.seen is not None and not case.seen[:, :NUM_UNSEEN_COLUMNS].any()
-    near, far = case.depth_range
+    sample = read_sample(tmp_path / "Plane")
+    assert np.allclose(sample.truth, truth, rtol=1e-5)
+    assert not sample.truth[0].any()  # infinite disparity: not known
+    assert sample.seen is not None and not sample.seen[:, :NUM_UNSEEN_COLUMNS].any()
+    near, far = sample.depth_range
     assert near < truth[1:].min() and truth.max() < far
 
 
 def test_the_true_depth_carries_one_view_into_the_other(tmp_path: Path) -> None:
     write_as_distributed(tmp_path / "Plane")
-    case = read_case(tmp_path / "Plane")
-    assert (case.truth > 0).mean() > 0.9
-    assert difference_when_warped(case) < 0.01
+    sample = read_sample(tmp_path / "Plane")
+    assert (sample.truth > 0).mean() > 0.9
+    assert difference_when_warped(sample) < 0.01
 
 
 def test_depth_is_what_middlebury_says(tmp_path: Path) -> None:
@@ -112,4 +112,4 @@ def test_what_is_wrong_is_named(
     write_as_distributed(tmp_path / "Plane")
     break_it(tmp_path / "Plane")
     with pytest.raises(WorkspaceError, match=words):
-        read_case(tmp_path / "Plane")
+        read_sample(tmp_path / "Plane")

@@ -12,45 +12,45 @@ from stereo_pairs import (
     TRUTH_NAME,
     write_stereo_pair,
 )
-from warped_cases import difference_when_warped
+from warped_samples import difference_when_warped
 from workspaces import plane_folder
 
 from resdepth_colmap.config import StereoConfig
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.evaluation.datasets.sample import CaseOptions, DepthCase
-from resdepth_colmap.evaluation.datasets.workspaces import read_workspace_cases
+from resdepth_colmap.evaluation.datasets.sample import DepthSample, SampleOptions
+from resdepth_colmap.evaluation.datasets.workspaces import read_workspace_samples
 from resdepth_colmap.io.colmap.depth_map import write_depth_map
 from resdepth_colmap.pipeline.refine.cross_view import NUM_SOURCE_MAPS
 
-OPTIONS = CaseOptions(stereo=StereoConfig(max_num_sources=3), num_sources=1)
+OPTIONS = SampleOptions(stereo=StereoConfig(max_num_sources=3), num_sources=1)
 
 
-def read_case(path: Path) -> DepthCase:
-    (load,) = read_workspace_cases(path, OPTIONS)
+def read_sample(path: Path) -> DepthSample:
+    (load,) = read_workspace_samples(path, OPTIONS)
     return load()
 
 
 def test_what_is_written_is_read(tmp_path: Path) -> None:
     truth = write_stereo_pair(tmp_path / "Plane")
-    case = read_case(tmp_path / "Plane")
-    assert np.array_equal(case.truth, truth)
-    assert case.seen is not None
-    assert not case.seen[:, :NUM_UNSEEN_COLUMNS].any()
-    assert case.seen[:, NUM_UNSEEN_COLUMNS:].all()
-    near, far = case.depth_range
+    sample = read_sample(tmp_path / "Plane")
+    assert np.array_equal(sample.truth, truth)
+    assert sample.seen is not None
+    assert not sample.seen[:, :NUM_UNSEEN_COLUMNS].any()
+    assert sample.seen[:, NUM_UNSEEN_COLUMNS:].all()
+    near, far = sample.depth_range
     assert near < np.percentile(truth, 5) and np.percentile(truth, 95) < far
-    assert case.initial is None
-    assert case.megapixels == pytest.approx(0.0048)
+    assert sample.initial is None
+    assert sample.megapixels == pytest.approx(0.0048)
 
 
 def test_the_true_depth_carries_one_view_into_the_other(tmp_path: Path) -> None:
     write_stereo_pair(tmp_path / "Plane")
-    assert difference_when_warped(read_case(tmp_path / "Plane")) < 0.01
+    assert difference_when_warped(read_sample(tmp_path / "Plane")) < 0.01
 
 
 def test_without_sparse_points_there_is_a_range_all_the_same(tmp_path: Path) -> None:
     truth = write_stereo_pair(tmp_path / "Plane", num_points=0)
-    near, far = read_case(tmp_path / "Plane").depth_range
+    near, far = read_sample(tmp_path / "Plane").depth_range
     assert near < truth.min() and truth.max() < far
 
 
@@ -65,11 +65,11 @@ def test_a_view_is_matched_against_all_and_compared_with_the_best(
     with_maps = plane_folder(tmp_path / "with", kinds=("geometric",))
     for folder in (without, with_maps):
         truth_of(folder, NAMES[2])
-    assert len(read_case(without).sources) == 3
-    case = read_case(with_maps)
-    assert len(case.sources) == NUM_SOURCE_MAPS
-    assert case.initial is not None
-    assert [it is not None for it in case.initial.source_depths] == [True] * 4
+    assert len(read_sample(without).sources) == 3
+    sample = read_sample(with_maps)
+    assert len(sample.sources) == NUM_SOURCE_MAPS
+    assert sample.initial is not None
+    assert [it is not None for it in sample.initial.source_depths] == [True] * 4
 
 
 def test_the_sources_that_patch_match_cfg_names_are_taken(tmp_path: Path) -> None:
@@ -77,10 +77,10 @@ def test_the_sources_that_patch_match_cfg_names_are_taken(tmp_path: Path) -> Non
     truth_of(folder, NAMES[0])
     cfg = folder / "stereo/patch-match.cfg"
     cfg.write_text(f"{NAMES[0]}\n{NAMES[4]}\n", encoding="utf-8")
-    (source,) = read_case(folder).sources
+    (source,) = read_sample(folder).sources
     everything = plane_folder(tmp_path / "all", kinds=())
     truth_of(everything, NAMES[4])
-    assert np.array_equal(source.gray, read_case(everything).reference.gray)
+    assert np.array_equal(source.gray, read_sample(everything).reference.gray)
 
 
 def without_truth(folder: Path) -> None:
@@ -128,13 +128,13 @@ def test_what_is_wrong_is_named(
     write_stereo_pair(tmp_path / "Plane")
     break_it(tmp_path / "Plane")
     with pytest.raises(WorkspaceError, match=words):
-        read_case(tmp_path / "Plane")
+        read_sample(tmp_path / "Plane")
 
 
 @pytest.mark.data
 def test_teddy_is_read_and_its_truth_is_right(
     shared_data: Callable[[str], Path],
 ) -> None:
-    case = read_case(shared_data("middlebury") / "Teddy")
-    assert case.truth.shape == case.reference.gray.shape
-    assert difference_when_warped(case) < 0.05
+    sample = read_sample(shared_data("middlebury") / "Teddy")
+    assert sample.truth.shape == sample.reference.gray.shape
+    assert difference_when_warped(sample) < 0.05

@@ -19,7 +19,7 @@ from resdepth_colmap.config import RefineConfig, StereoConfig
 from resdepth_colmap.errors import BackendUnavailableError
 from resdepth_colmap.evaluation.datasets.sample import InitialDepth
 from resdepth_colmap.evaluation.datasets.scenes import scene_sources
-from resdepth_colmap.evaluation.depth import sample_matching as case_matching
+from resdepth_colmap.evaluation.depth import sample_matching as sample_matching
 from resdepth_colmap.evaluation.depth.evaluation import (
     EvaluationOptions,
     Listener,
@@ -36,7 +36,7 @@ FAST = StereoConfig(num_iterations=3, window_radius=3)
 
 def options(tmp_path: Path, cache: MatchCache | None = None) -> EvaluationOptions:
     weights = identity_weights(tmp_path)
-    refine = RefineConfig(passes=2, weights=weights)
+    refine = RefineConfig(inner_iterations=2, weights=weights)
     return EvaluationOptions(refine=refine, stereo=FAST, cache=cache)
 
 
@@ -63,7 +63,7 @@ def test_the_record_is_plain_and_names_what_was_measured_with(tmp_path: Path) ->
     assert str(tmp_path) not in text
     assert json.loads(text) == record
     assert record["weights_sha256"] == weights_hash(identity_weights(tmp_path))
-    assert record["options"]["refine"]["passes"] == 2
+    assert record["options"]["refine"]["inner_iterations"] == 2
     assert record["options"]["stereo"]["num_iterations"] == FAST.num_iterations
     assert record["mean"]["mae_ratio"] == record["scenes"]["Plane"]["mae_ratio"]
     assert record["overall"]["refined"] == record["scenes"]["Plane"]["refined"]
@@ -150,7 +150,7 @@ def test_what_was_matched_is_not_matched_again(
     chosen = options(tmp_path, MatchCache(folder=tmp_path / "cache"))
     sources = scene_sources([tmp_path / "Plane"])
     first = evaluate_scenes(sources, chosen).to_mapping()["scenes"]["Plane"]
-    monkeypatch.delattr(case_matching, "match_view")
+    monkeypatch.delattr(sample_matching, "match_view")
     again = evaluate_scenes(sources, chosen).to_mapping()["scenes"]["Plane"]
     assert again["unfiltered"] == first["unfiltered"]
     assert again["matching_cpu_s_per_mp"] == first["matching_cpu_s_per_mp"]

@@ -10,7 +10,7 @@ from planes import plane_views
 
 from resdepth_colmap.config import StereoBackend, StereoConfig
 from resdepth_colmap.errors import BackendUnavailableError
-from resdepth_colmap.evaluation.datasets.sample import DepthCase, InitialDepth
+from resdepth_colmap.evaluation.datasets.sample import DepthSample, InitialDepth
 from resdepth_colmap.evaluation.depth.colmap_pair import match_by_colmap
 from resdepth_colmap.evaluation.depth.sample_matching import (
     cache_name,
@@ -41,9 +41,9 @@ def views() -> tuple[MatchView, ...]:
     )
 
 
-def case(initial: InitialDepth | None = None) -> DepthCase:
+def sample(initial: InitialDepth | None = None) -> DepthSample:
     reference, source = views()
-    return DepthCase(
+    return DepthSample(
         name="a/b.png",
         reference=reference,
         sources=(source,),
@@ -103,13 +103,13 @@ def test_colmap_is_told_not_to_filter(colmap: FakeColmap) -> None:
 
 
 def test_who_matched_is_said(colmap: FakeColmap) -> None:
-    by_colmap = initial_depth("scene", case(), StereoBackend.COLMAP, CONFIG)
+    by_colmap = initial_depth("scene", sample(), StereoBackend.COLMAP, CONFIG)
     assert by_colmap.origin == "COLMAP's PatchMatch (CUDA), unfiltered"
     assert by_colmap.cpu_s is None
-    by_us = initial_depth("scene", case(), StereoBackend.CPU, CONFIG)
+    by_us = initial_depth("scene", sample(), StereoBackend.CPU, CONFIG)
     assert by_us.origin == "our PatchMatch (CPU)" and by_us.cpu_s
     there = InitialDepth(depth=by_us.depth, origin="the user's")
-    assert initial_depth("s", case(there), StereoBackend.CPU, CONFIG) is there
+    assert initial_depth("s", sample(there), StereoBackend.CPU, CONFIG) is there
 
 
 def test_colmap_is_chosen_where_it_has_cuda(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -144,7 +144,7 @@ def test_the_geometric_pass_is_run_unless_it_is_switched_off() -> None:
     found = {}
     for passes, geometric in ((1, False), (2, True)):
         config = StereoConfig(num_iterations=2, geom_consistency=geometric)
-        found[passes] = initial_depth("scene", case(), StereoBackend.CPU, config)
+        found[passes] = initial_depth("scene", sample(), StereoBackend.CPU, config)
     right = {
         passes: np.mean(np.abs(it.depth / found[2].depth - 1) < 1e-6)
         for passes, it in found.items()

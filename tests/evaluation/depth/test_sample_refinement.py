@@ -10,8 +10,8 @@ from planes import NAMES, PlaneView, plane_views, write_plane_workspace
 from refined_plane import network
 
 from resdepth_colmap.config import RefineConfig
-from resdepth_colmap.evaluation.datasets.sample import DepthCase, InitialDepth
-from resdepth_colmap.evaluation.depth.sample_refinement import refine_case
+from resdepth_colmap.evaluation.datasets.sample import DepthSample, InitialDepth
+from resdepth_colmap.evaluation.depth.sample_refinement import refine_sample
 from resdepth_colmap.geometry.pixels import index_K
 from resdepth_colmap.io.colmap.depth_map import read_depth_map, write_depth_map
 from resdepth_colmap.io.colmap.workspace import open_workspace
@@ -21,7 +21,9 @@ from resdepth_colmap.network.weights import save_weights
 from resdepth_colmap.pipeline.refine.stage import refine_workspace
 from resdepth_colmap.scene import DepthMap, UnitColors
 
-CONFIG = RefineConfig(tile_px=64, overlap_px=16, keep_confirmed=False, rounds=2)
+CONFIG = RefineConfig(
+    tile_px=64, overlap_px=16, update_gating=False, outer_iterations=2
+)
 
 
 def noisy(view: PlaneView, seed: int) -> DepthMap:
@@ -44,9 +46,9 @@ def colors_of(view: PlaneView) -> UnitColors:
 
 
 @pytest.fixture
-def case() -> DepthCase:
+def sample() -> DepthSample:
     first, second, third = plane_views()[:3]
-    return DepthCase(
+    return DepthSample(
         name="plane",
         reference=gray_of(first),
         sources=(gray_of(second), gray_of(third)),
@@ -62,23 +64,25 @@ def case() -> DepthCase:
     )
 
 
-def refined(case: DepthCase, net: ResDepthNet, rounds: int) -> DepthMap:
-    assert case.initial is not None
-    config = dataclasses.replace(CONFIG, rounds=rounds)
-    return refine_case(case, case.initial, net, config).depth
+def refined(sample: DepthSample, net: ResDepthNet, rounds: int) -> DepthMap:
+    assert sample.initial is not None
+    config = dataclasses.replace(CONFIG, outer_iterations=rounds)
+    return refine_sample(sample, sample.initial, net, config).depth
 
 
-def test_a_second_round_starts_from_what_became_of_the_sources(case: DepthCase) -> None:
-    net, initial = network(seed=2), case.initial
+def test_a_second_round_starts_from_what_became_of_the_sources(
+    sample: DepthSample,
+) -> None:
+    net, initial = network(seed=2), sample.initial
     assert initial is not None
     depths = [initial.depth, *(d for d in initial.source_depths if d is not None)]
-    views = [case.reference, *case.sources]
-    colors = [case.colors, *case.source_colors]
+    views = [sample.reference, *sample.sources]
+    colors = [sample.colors, *sample.source_colors]
     made = []
     for own in (1, 2):
         order = [own, *(place for place in range(3) if place != own)]
         turned = dataclasses.replace(
-            case,
+            sample,
             reference=views[own],
             sources=tuple(views[place] for place in order[1:]),
             colors=colors[own],
@@ -90,10 +94,10 @@ def test_a_second_round_starts_from_what_became_of_the_sources(case: DepthCase) 
         )
         made.append(refined(turned, net, 1))
     after = dataclasses.replace(initial, source_depths=tuple(made))
-    expected = refined(dataclasses.replace(case, initial=after), net, 1)
-    actual = refined(case, net, 2)
+    expected = refined(dataclasses.replace(sample, initial=after), net, 1)
+    actual = refined(sample, net, 2)
     np.testing.assert_array_equal(actual, expected)
-    assert np.abs(actual / refined(case, net, 1) - 1).max() > 1e-3
+    assert np.abs(actual / refined(sample, net, 1) - 1).max() > 1e-3
 
 
 @pytest.mark.parametrize(
@@ -106,21 +110,23 @@ def test_a_second_round_starts_from_what_became_of_the_sources(case: DepthCase) 
     ],
 )
 def test_sources_without_any_depth_stay_so(
-    case: DepthCase, without: Callable[[InitialDepth], InitialDepth]
+    sample: DepthSample, without: Callable[[InitialDepth], InitialDepth]
 ) -> None:
-    assert case.initial is not None
-    case = dataclasses.replace(case, initial=without(case.initial))
+    assert sample.initial is not None
+    sample = dataclasses.replace(sample, initial=without(sample.initial))
     net = network(seed=2)
-    np.testing.assert_array_equal(refined(case, net, 2), refined(case, net, 1))
+    np.testing.assert_array_equal(refined(sample, net, 2), refined(sample, net, 1))
 
 
-def test_a_network_that_sees_no_maps_of_others_is_asked_once(case: DepthCase) -> None:
+def test_a_network_that_sees_no_maps_of_others_is_asked_once(
+    sample: DepthSample,
+) -> None:
     net = network(seed=2, source_depth=False)
-    np.testing.assert_array_equal(refined(case, net, 3), refined(case, net, 1))
+    np.testing.assert_array_equal(refined(sample, net, 3), refined(sample, net, 1))
 
 
 def test_a_pair_becomes_what_a_workspace_of_two_views_makes_of_it(
-    case: DepthCase, tmp_path: Path
+    sample: DepthSample, tmp_path: Path
 ) -> None:
     views = write_plane_workspace(tmp_path / "scene")[:2]
     workspace, net = open_workspace(tmp_path / "scene"), network(seed=2)
@@ -135,7 +141,7 @@ def test_a_pair_becomes_what_a_workspace_of_two_views_makes_of_it(
     config = dataclasses.replace(CONFIG, weights=tmp_path / "net.safetensors")
     output = refine_workspace(workspace, config).output
     expected = read_depth_map(output.depth_map_path(NAMES[0]))
-    pair = dataclasses.replace(case, sources=case.sources[:1])
+    pair = dataclasses.replace(sample, sources=sample.sources[:1])
     actual = refined(pair, net.eval(), 2)
     # Grey values were rounded on their way: a pixel on a limit may fall beyond it.
     assert np.isclose(actual, expected, rtol=2e-3).mean() > 0.999

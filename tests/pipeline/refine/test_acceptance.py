@@ -9,7 +9,7 @@ from analytic_scene import PLANE_NORMAL, PLANE_OFFSET, depth_of_plane, two_views
 from refined_plane import TILES, expect_error, network, view
 
 from resdepth_colmap.geometry.pixels import index_K
-from resdepth_colmap.pipeline.refine.acceptance import KeptDepth
+from resdepth_colmap.pipeline.refine.acceptance import UpdateGate
 from resdepth_colmap.pipeline.refine.cross_view import SourceMap, start_from
 from resdepth_colmap.pipeline.refine.network_inputs import ViewTensors, seen_by_sources
 from resdepth_colmap.pipeline.refine.source_sampler import SourceTensors
@@ -20,7 +20,7 @@ from resdepth_colmap.scene import DepthMap, cam_from_cam
 def with_and_without_rule(initial: ViewInputs) -> tuple[DepthMap, DepthMap]:
     """The depth that a network gives that changes much, with the rule and without."""
     net = network(seed=1)
-    without = dataclasses.replace(TILES, keep_confirmed=False)
+    without = dataclasses.replace(TILES, update_gating=False)
     configs = (TILES, without)
     first, second = (refine_view(initial, net, config).depth for config in configs)
     return first, second
@@ -30,7 +30,7 @@ DISPARITY_PX = 20
 INVERSE_DEPTH = 0.5
 
 
-def facing_wall(texture: float = 1.0, num_confirming: int | None = None) -> ViewTensors:
+def facing_wall(texture: float = 1.0, num_consistent: int | None = None) -> ViewTensors:
     """Two views of a wall of random texture, at its true depth."""
     rng = np.random.default_rng(0)
     wall = torch.from_numpy(0.5 + texture * (rng.random((1, 1, 32, 84)) - 0.5)).float()
@@ -45,15 +45,15 @@ def facing_wall(texture: float = 1.0, num_confirming: int | None = None) -> View
         gray=wall[..., DISPARITY_PX:],
         K=K,
         sources=(SourceTensors(wall[..., :64], K, pose),),
-        num_confirming=(
-            None if num_confirming is None else valid.to(torch.uint8) * num_confirming
+        num_consistent=(
+            None if num_consistent is None else valid.to(torch.uint8) * num_consistent
         ),
     )
 
 
 def kept_share(view: ViewTensors, change: float, num_errors: float = 1e6) -> float:
     """Where the source sees it, of a relative change of so many expected errors."""
-    kept = KeptDepth(view, 1, seen_by_sources(view, 1).consistency)
+    kept = UpdateGate(view, 1, seen_by_sources(view, 1).consistency)
     error = torch.full_like(view.inverse_depth, abs(change) / num_errors)
     refined = view.inverse_depth * (1.0 + change)
     is_kept = kept.is_kept(refined, error * view.inverse_depth)
@@ -62,18 +62,18 @@ def kept_share(view: ViewTensors, change: float, num_errors: float = 1e6) -> flo
 
 def test_a_small_change_that_the_photographs_contradict_is_not_taken() -> None:
     assert kept_share(facing_wall(), 0.025) > 0.98
-    assert kept_share(facing_wall(texture=0.0, num_confirming=1), 0.025) == 0.0
+    assert kept_share(facing_wall(texture=0.0, num_consistent=1), 0.025) == 0.0
     assert kept_share(facing_wall(), 0.1) == 0.0  # the correction of an outlier
 
 
 def test_what_the_photographs_like_better_is_taken_from_any_map() -> None:
-    right = facing_wall(num_confirming=1)
+    right = facing_wall(num_consistent=1)
     wrong = right._replace(inverse_depth=right.inverse_depth / 1.025)
     assert kept_share(wrong, 0.025) == 0.0
 
 
 def test_what_more_maps_confirm_stays_within_more_of_the_expected_error() -> None:
-    for texture, num_confirming, num_errors in (
+    for texture, num_consistent, num_errors in (
         (1.0, 3, 4.0),  # contradicted by the photographs
         (1.0, 2, 4.0),
         (1.0, 1, 0.5),
@@ -82,7 +82,7 @@ def test_what_more_maps_confirm_stays_within_more_of_the_expected_error() -> Non
         (0.0, 0, 0.1),
         (0.0, None, 0.1),
     ):
-        wall = facing_wall(texture, num_confirming)
+        wall = facing_wall(texture, num_consistent)
         assert kept_share(wall, 0.1, 0.98 * num_errors) > 0.98
         assert kept_share(wall, 0.1, 1.02 * num_errors) < 0.02
 
@@ -207,6 +207,6 @@ def test_a_change_within_the_expected_error_is_not_made() -> None:
     measured = initial.depth > 0
     np.testing.assert_allclose(unchanged[measured], initial.depth[measured], rtol=1e-6)
     assert not np.isclose(changed, unchanged, rtol=1e-5).all()
-    without = dataclasses.replace(TILES, keep_confirmed=False)
+    without = dataclasses.replace(TILES, update_gating=False)
     free = refine_view(initial, net, without).depth
     assert not np.isclose(free, unchanged, rtol=1e-3).all()

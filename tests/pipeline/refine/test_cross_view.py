@@ -20,8 +20,8 @@ from resdepth_colmap.geometry.inverse_depth import invert_map
 from resdepth_colmap.geometry.pixels import index_K
 from resdepth_colmap.pipeline.refine.cross_view import (
     SourceMap,
-    carried_depth,
     goes_along_rows,
+    reprojected_depth,
     start_from,
 )
 from resdepth_colmap.scene import FloatMap, View, cam_from_cam
@@ -49,43 +49,43 @@ def map_of(source: View, factor: float = 1.0) -> SourceMap:
 def test_a_right_map_confirms_a_right_depth_and_not_a_wrong_one() -> None:
     reference, source = two_views()
     right = inverse_seen_by(reference)
-    carried, num_confirming = carried_depth(right, K, [map_of(source)])
-    arrived = carried > 0
+    reprojected, num_consistent = reprojected_depth(right, K, [map_of(source)])
+    arrived = reprojected > 0
     assert arrived.mean() > 0.6
-    assert num_confirming[arrived].mean() > 0.95
-    np.testing.assert_allclose(carried[arrived], right[arrived], rtol=0.02)
+    assert num_consistent[arrived].mean() > 0.95
+    np.testing.assert_allclose(reprojected[arrived], right[arrived], rtol=0.02)
     for factor in (0.8, 1.2):  # more than a pixel
         wrong: FloatMap = (factor * right).astype(np.float32)
-        assert not carried_depth(wrong, K, [map_of(source)]).num_confirming.any()
+        assert not reprojected_depth(wrong, K, [map_of(source)]).num_consistent.any()
 
 
 def test_of_several_maps_the_one_that_confirms_counts() -> None:
     reference, source = two_views()
     right = inverse_seen_by(reference)
     maps = [map_of(source, factor) for factor in (0.8, 1.0, 1.3)]
-    alone = carried_depth(right, K, [maps[1]])
-    confirmed = alone.num_confirming > 0
+    alone = reprojected_depth(right, K, [maps[1]])
+    consistent = alone.num_consistent > 0
     for order in (maps, maps[::-1]):
-        together = carried_depth(right, K, order)
-        np.testing.assert_array_equal(together.num_confirming, alone.num_confirming)
+        together = reprojected_depth(right, K, order)
+        np.testing.assert_array_equal(together.num_consistent, alone.num_consistent)
         change = np.abs(together.inverse_depth - right)
-        assert (change <= np.abs(alone.inverse_depth - right))[confirmed].all()
+        assert (change <= np.abs(alone.inverse_depth - right))[consistent].all()
 
 
 def test_each_map_that_says_the_same_is_counted() -> None:
     reference, source = two_views()
     right = inverse_seen_by(reference)
-    once = carried_depth(right, K, [map_of(source)]).num_confirming
+    once = reprojected_depth(right, K, [map_of(source)]).num_consistent
     maps = [map_of(source), map_of(source, 1.3), map_of(source), map_of(source)]
-    counts = carried_depth(right, K, maps).num_confirming
+    counts = reprojected_depth(right, K, maps).num_consistent
     np.testing.assert_array_equal(counts, 3 * once)
 
 
 def test_without_maps_nothing_is_said() -> None:
     right = inverse_seen_by(two_views()[0])
-    carried, num_confirming = carried_depth(right, K, [])
-    assert not carried.any()
-    assert not num_confirming.any()
+    reprojected, num_consistent = reprojected_depth(right, K, [])
+    assert not reprojected.any()
+    assert not num_consistent.any()
 
 
 @given(st.floats(0.002, 0.1), st.floats(-0.2, 0.2))
@@ -103,9 +103,9 @@ def test_a_pixel_of_the_other_image_is_allowed_however_short_the_baseline(
     found = invert_map((wall / (1 + change)).astype(np.float32))
     moved_px = abs(change) / 4.0 * baseline * CAMERA.fx
     assume(abs(moved_px - 1.0) > 0.01 and abs(abs(change) / (1 + change) - 0.02) > 1e-4)
-    confirms = carried_depth(found, K, [other]).num_confirming > 0
+    is_consistent_with = reprojected_depth(found, K, [other]).num_consistent > 0
     expected = moved_px < 1.0 or abs(change) / (1 + change) < 0.02
-    assert confirms[:, 8:-8].all() == expected
+    assert is_consistent_with[:, 8:-8].all() == expected
 
 
 @pytest.mark.parametrize(
@@ -127,8 +127,8 @@ def test_a_map_of_another_size_says_the_same() -> None:
         camera=source.camera.resized(CAMERA.width_px // 2, CAMERA.height_px // 2),
     )
     right = inverse_seen_by(reference)
-    carried, num_confirming = carried_depth(right, K, [map_of(half)])
-    assert num_confirming[carried > 0].mean() > 0.95
+    reprojected, num_consistent = reprojected_depth(right, K, [map_of(half)])
+    assert num_consistent[reprojected > 0].mean() > 0.95
 
 
 def test_the_holes_of_a_filtered_map_take_what_other_views_measured() -> None:
@@ -139,12 +139,12 @@ def test_the_holes_of_a_filtered_map_take_what_other_views_measured() -> None:
     found = np.where(holes, 0, depth)
     start = start_from(found, K, [map_of(source)])
     inverse_depth = inverse_seen_by(reference)
-    seen = carried_depth(inverse_depth, K, [map_of(source)]).num_confirming > 0
+    seen = reprojected_depth(inverse_depth, K, [map_of(source)]).num_consistent > 0
     error = np.abs(start.inverse_depth * depth - 1)
     assert error[holes & seen].max() < 0.02
     np.testing.assert_array_equal(start.valid, ~holes)
-    assert start.num_confirming is not None
-    assert not start.num_confirming[holes].any()
+    assert start.num_consistent is not None
+    assert not start.num_consistent[holes].any()
     np.testing.assert_array_equal(
         start.inverse_depth[~holes], invert_map(found)[~holes]
     )
@@ -155,6 +155,6 @@ def test_maps_of_another_scene_are_not_listened_to() -> None:
     depth = plane_seen_by(reference)
     alone = start_from(depth, K, [])
     start = start_from(depth, K, [map_of(source, 3.0)])
-    assert start.carried is None and start.num_confirming is None
+    assert start.reprojected is None and start.num_consistent is None
     np.testing.assert_array_equal(start.inverse_depth, alone.inverse_depth)
     assert start.valid.all()

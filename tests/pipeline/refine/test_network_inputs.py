@@ -12,9 +12,9 @@ from analytic_scene import (
 from resdepth_colmap.geometry.inverse_depth import inverse_depth
 from resdepth_colmap.network.network_config import (
     BLUE,
-    CARRIED,
-    CARRIED_CHANGE,
     RED,
+    REPROJECTED,
+    REPROJECTED_CHANGE,
     InputVariant,
     NetworkConfig,
     Normalisation,
@@ -243,15 +243,17 @@ def test_the_sources_map_is_shown_as_a_difference_in_the_tiles_own_scale() -> No
     said_by_maps = view.inverse_depth.clone()
     said_by_maps[..., :20] = 0
     config = NetworkConfig()
-    change, carried = (config.channels.index(n) for n in (CARRIED_CHANGE, CARRIED))
+    change, reprojected = (
+        config.channels.index(n) for n in (REPROJECTED_CHANGE, REPROJECTED)
+    )
     blind, _ = network_input(build_inputs(view, config), config)
-    assert not blind[:, [change, carried]].any()
+    assert not blind[:, [change, reprojected]].any()
     for factor in (1.0, 1.25):
         moved = view._replace(
-            inverse_depth=view.inverse_depth * factor, carried=said_by_maps
+            inverse_depth=view.inverse_depth * factor, reprojected=said_by_maps
         )
         stack, scaling = network_input(build_inputs(moved, config), config)
-        arrived = stack[:, carried] > 0
+        arrived = stack[:, reprojected] > 0
         assert torch.equal(arrived, said_by_maps[:, 0] > 0)
         assert not stack[:, change][~arrived].any()
         # What the map says is the input depth plus the difference.

@@ -5,8 +5,8 @@ from analytic_scene import Pair, plane_pair, sphere_pair
 
 from resdepth_colmap.geometry.inverse_depth import inverse_depth
 from resdepth_colmap.pipeline.refine.source_sampler import (
-    SecondLook,
     Sight,
+    SourceSampler,
     SourceTensors,
 )
 
@@ -31,18 +31,18 @@ def test_at_the_true_depth_the_source_shows_what_the_reference_shows() -> None:
 def test_a_window_shows_the_same_as_the_whole() -> None:
     pair = plane_pair()
     depths = inverse_depth(pair.depth)
-    look = SecondLook((sight_of(pair),))
-    whole = look.gray_at(depths)
+    sample_source = SourceSampler((sight_of(pair),))
+    whole = sample_source.gray_at(depths)
     window = (..., slice(7, 30), slice(11, 50))
-    part = look.crop(7, 11).gray_at(depths[window])
+    part = sample_source.crop(7, 11).gray_at(depths[window])
     torch.testing.assert_close(part, whole[window], rtol=0, atol=1e-6)
 
 
 def test_each_tile_has_its_own_source_or_none() -> None:
     plane, sphere = plane_pair(), sphere_pair()
     depths = torch.cat([inverse_depth(pair.depth) for pair in (plane, plane, sphere)])
-    look = SecondLook((sight_of(plane), None, sight_of(sphere)))
-    both = look.gray_at(depths)
+    sample_source = SourceSampler((sight_of(plane), None, sight_of(sphere)))
+    both = sample_source.gray_at(depths)
     assert torch.equal(both[0], sight_of(plane).gray_at(depths[0]))
     assert not both[1].any()
     assert torch.equal(both[2], sight_of(sphere).gray_at(depths[2]))

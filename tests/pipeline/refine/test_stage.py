@@ -207,12 +207,14 @@ def test_a_changed_source_image_means_again(tmp_path: Path) -> None:
 def test_other_options_or_weights_mean_again(tmp_path: Path) -> None:
     folder = plane_folder(tmp_path)
     refine(folder)
-    assert len(refine(folder, passes=2).refined) == len(NAMES)
-    assert len(refine(folder, passes=2).refined) == 0
-    assert len(refine(folder, passes=2, keep_confirmed=False).refined) == len(NAMES)
+    assert len(refine(folder, inner_iterations=2).refined) == len(NAMES)
+    assert len(refine(folder, inner_iterations=2).refined) == 0
+    assert len(refine(folder, inner_iterations=2, update_gating=False).refined) == len(
+        NAMES
+    )
     other = identity_weights(tmp_path, seed=1)
-    assert len(refine(folder, passes=2, weights=other).refined) == len(NAMES)
-    again = refine(folder, passes=2, weights=other, overwrite=True)
+    assert len(refine(folder, inner_iterations=2, weights=other).refined) == len(NAMES)
+    again = refine(folder, inner_iterations=2, weights=other, overwrite=True)
     assert len(again.refined) == len(NAMES)
 
 

@@ -30,13 +30,13 @@ def check(refined: RefinedView, shape: tuple[int, ...]) -> None:
 
 
 @pytest.mark.parametrize("normalisation", Normalisation)
-@pytest.mark.parametrize("passes", [1, 2])
+@pytest.mark.parametrize("inner_iterations", [1, 2])
 @pytest.mark.parametrize("outliers", [False, True])
 def test_a_fresh_network_gives_the_initial_depth_back(
-    normalisation: Normalisation, passes: int, outliers: bool
+    normalisation: Normalisation, inner_iterations: int, outliers: bool
 ) -> None:
     initial = view(outliers=outliers)
-    config = dataclasses.replace(TILES, passes=passes)
+    config = dataclasses.replace(TILES, inner_iterations=inner_iterations)
     refined = refine_view(initial, network(normalisation=normalisation), config)
     valid = initial.depth > 0
     np.testing.assert_allclose(refined.depth[valid], initial.depth[valid], rtol=2e-7)
@@ -61,7 +61,7 @@ def test_every_variant_gives_whole_maps(
         confidence=extras,
     )
     initial = view(num_sources, outliers=True)
-    refined = refine_view(initial, net, dataclasses.replace(TILES, passes=2))
+    refined = refine_view(initial, net, dataclasses.replace(TILES, inner_iterations=2))
     check(refined, initial.depth.shape)
 
 
@@ -96,7 +96,7 @@ def test_the_depth_stays_near_the_range_that_was_measured() -> None:
     net = network(seed=4)
     torch.nn.init.constant_(net.head.bias, 1e6)  # type: ignore[arg-type]
     initial = view()
-    without = dataclasses.replace(TILES, keep_confirmed=False)
+    without = dataclasses.replace(TILES, update_gating=False)
     refined = refine_view(initial, net, without)
     measured = initial.depth[initial.depth > 0]
     np.testing.assert_allclose(refined.depth, measured.min() / 4, rtol=1e-5)

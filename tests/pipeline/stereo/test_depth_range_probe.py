@@ -14,7 +14,7 @@ from resdepth_colmap.io.colmap.model import read_scene
 from resdepth_colmap.io.colmap.workspace import open_workspace
 from resdepth_colmap.matching.patch_match import MatchView
 from resdepth_colmap.pipeline.stereo import passes as stereo_passes
-from resdepth_colmap.pipeline.stereo.depth_range_probe import sketched_range
+from resdepth_colmap.pipeline.stereo.depth_range_probe import probed_range
 from resdepth_colmap.pipeline.stereo.ledger import StereoLedger
 from resdepth_colmap.pipeline.stereo.passes import StereoPass, ViewMatcher
 from resdepth_colmap.pipeline.stereo.plan import plan_stereo
@@ -32,7 +32,7 @@ VIEWS = [
 
 
 def test_the_range_is_that_of_the_surface_stretched() -> None:
-    near, far = sketched_range(VIEWS[0], VIEWS[1:], WIDE, StereoConfig())
+    near, far = probed_range(VIEWS[0], VIEWS[1:], WIDE, StereoConfig())
     depth = PLANE[0].depth
     assert depth.min() / 2 < near < np.percentile(depth, 5)
     assert np.percentile(depth, 95) < far < depth.max() * 5
@@ -40,11 +40,11 @@ def test_the_range_is_that_of_the_surface_stretched() -> None:
 
 def test_where_nothing_is_seen_the_range_stays_wide() -> None:
     grey = [dataclasses.replace(v, gray=np.full_like(v.gray, 0.5)) for v in VIEWS]
-    assert sketched_range(grey[0], grey[1:], WIDE, StereoConfig()) == WIDE
+    assert probed_range(grey[0], grey[1:], WIDE, StereoConfig()) == WIDE
 
 
 @pytest.mark.parametrize(
-    ("num_points", "options", "is_sketched"),
+    ("num_points", "options", "is_probed"),
     [
         (0, {}, True),
         (200, {}, False),  # COLMAP's rule
@@ -56,15 +56,15 @@ def test_only_a_guess_is_narrowed_and_but_once(
     monkeypatch: pytest.MonkeyPatch,
     num_points: int,
     options: dict[str, float],
-    is_sketched: bool,
+    is_probed: bool,
 ) -> None:
     sizes: list[tuple[int, ...]] = []
 
-    def sketch(reference: MatchView, *_: object) -> tuple[float, float]:
+    def probe(reference: MatchView, *_: object) -> tuple[float, float]:
         sizes.append(reference.gray.shape)
         return 2.0, 8.0
 
-    monkeypatch.setattr(stereo_passes, "sketched_range", sketch)
+    monkeypatch.setattr(stereo_passes, "probed_range", probe)
     monkeypatch.setattr(stereo_passes, "SIDE_PX", 40)
     folder = plane_folder(tmp_path, kinds=(), num_points=num_points)
     workspace = open_workspace(folder)
@@ -75,4 +75,4 @@ def test_only_a_guess_is_narrowed_and_but_once(
     which = StereoPass(kind="photometric", is_filtered=False)
     for _ in range(2):
         matcher.match(plans[0], which, lambda _: None)
-    assert sizes == ([(30, 40)] if is_sketched else [])
+    assert sizes == ([(30, 40)] if is_probed else [])

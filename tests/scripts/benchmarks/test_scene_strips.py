@@ -11,7 +11,7 @@ from workspaces import identity_weights
 
 from resdepth_colmap.config import RefineConfig
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.evaluation.depth import sample_matching as case_matching
+from resdepth_colmap.evaluation.depth import sample_matching as sample_matching
 from resdepth_colmap.evaluation.depth.match_cache import MatchCache
 from resdepth_colmap.io.colmap.depth_map import read_depth_map
 from resdepth_colmap.io.images import read_rgb
@@ -21,8 +21,8 @@ from scripts.benchmarks.scene_strips import scene_strips, scenes_at
 @pytest.fixture
 def matcher(monkeypatch: pytest.MonkeyPatch) -> FakeMatcher:
     fake = FakeMatcher()
-    monkeypatch.setattr(case_matching, "match_view", fake)
-    monkeypatch.setattr(case_matching, "_compile", lambda: None)
+    monkeypatch.setattr(sample_matching, "match_view", fake)
+    monkeypatch.setattr(sample_matching, "_compile", lambda: None)
     return fake
 
 

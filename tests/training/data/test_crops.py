@@ -169,7 +169,7 @@ def test_the_source_that_is_looked_at_again_fits_the_crop(
     batch = sampler_of(samples, batch_size=16).batch(0)
     names = NETWORK.channels
     reference = batch.inputs[:, [names.index("reference")]]
-    there = batch.look(batch.target)
+    there = batch.sample_source(batch.target)
     inside = there > 0
     middle = (..., slice(4, -4), slice(4, -4))
     badness = photo_consistency(reference, [(there, inside)])[middle]
@@ -186,6 +186,8 @@ def test_light_changes_the_source_alike(samples: tuple[Path, ...]) -> None:
     place = NETWORK.channels.index("source_0")
     initial = plain.inputs[:, :1]
     for batch in (plain, lit):
-        again, stored = batch.look(initial), batch.inputs[:, [place]]
+        again, stored = batch.sample_source(initial), batch.inputs[:, [place]]
         torch.testing.assert_close(again.mean(), stored.mean(), rtol=0.02, atol=0)
-    assert not torch.allclose(plain.look(initial), lit.look(initial), atol=0.01)
+    assert not torch.allclose(
+        plain.sample_source(initial), lit.sample_source(initial), atol=0.01
+    )

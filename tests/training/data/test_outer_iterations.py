@@ -10,13 +10,13 @@ from planes import NAMES
 from refined_plane import network
 from workspaces import identity_weights
 
-from resdepth_colmap.network.network_config import CARRIED_CHANGE, NetworkConfig
+from resdepth_colmap.network.network_config import REPROJECTED_CHANGE, NetworkConfig
 from resdepth_colmap.network.weights import save_weights
 from resdepth_colmap.training.data.crops import CropSampler
 from resdepth_colmap.training.data.outer_iterations import prepare_later_rounds
 from resdepth_colmap.training.data.samples import (
     AGAIN,
-    COMPLETED,
+    FILLED,
     guidance_names,
     prepare_samples,
     read_sample,
@@ -49,10 +49,10 @@ def test_a_network_that_changes_nothing_makes_the_samples_of_the_first_round(
     scene: Path, tmp_path: Path
 ) -> None:
     firsts = prepare_samples([scene], CONFIG, tmp_path / "cache")
-    completed = [path for path in firsts if path.stem.endswith(COMPLETED)]
+    filled_in = [path for path in firsts if path.stem.endswith(FILLED)]
     again = prepared(scene, identity_weights(tmp_path))
-    assert len(again) == len(completed) == len(NAMES)
-    for path, expected_path in zip(again, completed, strict=True):
+    assert len(again) == len(filled_in) == len(NAMES)
+    for path, expected_path in zip(again, filled_in, strict=True):
         assert path.stem.endswith(AGAIN) and "-photometric-" in path.stem
         sample, expected = read_sample(path), read_sample(expected_path)
         np.testing.assert_array_equal(sample.target, expected.target)
@@ -64,7 +64,7 @@ def test_a_network_that_changes_nothing_makes_the_samples_of_the_first_round(
 def test_what_the_others_say_is_what_the_network_made_of_it(
     scene: Path, tmp_path: Path
 ) -> None:
-    place = guidance_names(CONFIG.num_sources).index(CARRIED_CHANGE)
+    place = guidance_names(CONFIG.num_sources).index(REPROJECTED_CHANGE)
     first, second = (
         [read_sample(path).guidance[place] for path in prepared(scene, weights)]
         for weights in (identity_weights(tmp_path), farther_weights(tmp_path))
@@ -80,7 +80,7 @@ def test_what_a_third_round_looks_at_was_refined_twice(
     seconds, both = prepared(scene, weights), prepared(scene, weights, num_rounds=3)
     thirds = [path for path in both if path not in seconds]
     assert len(both) == 2 * len(thirds) == 2 * len(NAMES)
-    place = guidance_names(CONFIG.num_sources).index(CARRIED_CHANGE)
+    place = guidance_names(CONFIG.num_sources).index(REPROJECTED_CHANGE)
     for second, third in zip(seconds, thirds, strict=True):
         before, after = read_sample(second), read_sample(third)
         np.testing.assert_array_equal(before.target, after.target)
@@ -107,6 +107,6 @@ def test_more_than_half_of_the_crops_with_other_maps_are_of_later_rounds(
         paths=tuple(paths), config=CONFIG, batch_size=200, crop_px=32, seed=0
     )
     names = sampler.batch(0).names
-    counts = [sum(name.endswith(end) for name in names) for end in (COMPLETED, AGAIN)]
+    counts = [sum(name.endswith(end) for name in names) for end in (FILLED, AGAIN)]
     assert sum(counts) == pytest.approx(136, abs=20)
     assert counts[1] == pytest.approx(0.6 * sum(counts), abs=20)

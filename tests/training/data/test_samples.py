@@ -16,8 +16,8 @@ from resdepth_colmap.network.network_config import InputVariant, NetworkConfig
 from resdepth_colmap.training.data import labelled_views as labelled_views_module
 from resdepth_colmap.training.data.labelled_views import labelled_views
 from resdepth_colmap.training.data.samples import (
-    COMPLETED,
     DENSE,
+    FILLED,
     HOLES,
     guidance_names,
     prepare_samples,
@@ -38,7 +38,7 @@ def test_unfiltered_and_filtered_maps_of_a_view_are_samples_of_their_own(
     scene = write_noisy_plane(tmp_path / "room", kinds=("photometric", "geometric"))
     paths = prepare_samples([scene], NETWORK, tmp_path / "cache")
     assert len(set(paths)) == len(paths)
-    expected = {"photometric": {DENSE, COMPLETED, HOLES}, "geometric": {HOLES}}
+    expected = {"photometric": {DENSE, FILLED, HOLES}, "geometric": {HOLES}}
     for kind, ends in expected.items():
         own = [name for name in names_of(paths) if f"-{kind}-" in name]
         assert {"-" + name.rsplit("-", 1)[1] for name in own} == ends
@@ -87,8 +87,8 @@ def test_all_variants_share_their_samples(tmp_path: Path) -> None:
         "source_0",
         "valid",
         "photo_consistency",
-        "carried_change",
-        "carried",
+        "reprojected_change",
+        "reprojected",
         "red",
         "blue",
     )

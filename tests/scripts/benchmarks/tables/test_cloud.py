@@ -8,13 +8,13 @@ from scripts.benchmarks.tables.cloud import cloud_table, largest_difference
 def measured() -> dict[str, Any]:
     scores = {"accuracy": [0.5, 0.75], "completeness": [0.25, 1.0], "f1": [0.3, 0.8]}
     ours = {**scores, "f1": [0.302, 0.8]}
-    case = {"tolerances": [0.01, 0.5], "official": scores, "ours": ours}
+    sample = {"tolerances": [0.01, 0.5], "official": scores, "ours": ours}
     size = {"num_points": 1000000, "num_scan_points": 2000, "seconds": 4.56}
     times = {"cpu_seconds": 3.21, "peak_memory_mb": 512}
     return {
         "command": "python bench.py",
         "date": "2026-01-02",
-        "cases": {"two_scans": case, "exact": {**case, "ours": scores}},
+        "samples": {"two_scans": sample, "exact": {**sample, "ours": scores}},
         "sizes": [{**size, **times}],
     }
 

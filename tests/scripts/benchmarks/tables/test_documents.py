@@ -50,7 +50,7 @@ def middlebury(refined_mae: float | None = 0.1) -> dict[str, Any]:
         "command": "python bench.py",
         "date": "2026-01-02",
         "weights_sha256": "0123456789abcdef",
-        "options": {"refine": {"passes": 2}},
+        "options": {"refine": {"inner_iterations": 2}},
         "scenes": {"Teddy": scene, "Pipes": {**scene, "unfiltered": errors(0.4)}},
         "mean": {"mae_ratio": 0.375, "medae_ratio": None},
     }
@@ -85,7 +85,7 @@ def test_an_error_that_is_missing_is_a_dash_in_its_mean_too() -> None:
 
 
 def test_workspaces_share_the_columns_of_all_their_stages() -> None:
-    case = {
+    sample = {
         "options": ["--input", "geometric"],
         "num_images": 4,
         "seconds": {"stereo": 1.0, "refine": 2.25},
@@ -97,14 +97,14 @@ def test_workspaces_share_the_columns_of_all_their_stages() -> None:
         "filled_after": 1.0,
     }
     other = {
-        **case,
+        **sample,
         "options": [],
         "seconds": {"fuse": 3.0},
         "peak_memory_mb": None,
         "points_before": None,
         "date": "2026-01-02",
     }
-    text = workspaces_table({"plant": case, "walnut": other})
+    text = workspaces_table({"plant": sample, "walnut": other})
     assert len(columns(text)) == 1
     assert (
         "| plant | `--input geometric` | 4 | 1.0 | 2.2 | - | 4.0 | 1.5 GiB | "

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from scripts.benchmarks.tables.variants import (
-    ARMS,
     BEYOND,
+    METHODS,
     WORST_FIRST,
     beyond_table,
     out_of_order,
@@ -16,7 +16,7 @@ from scripts.benchmarks.tables.variants import (
 
 
 def measured(**maes: float) -> dict[str, Any]:
-    arms = {
+    methods = {
         name: {
             "mae": mae,
             "rmse": 0.5,
@@ -39,14 +39,14 @@ def measured(**maes: float) -> dict[str, Any]:
             "max_channels": 128,
             "normalisation": "baseline",
         },
-        "sets": {"rendered": {"num_views": 7, "arms": arms}},
+        "sets": {"rendered": {"num_views": 7, "methods": methods}},
     }
 
 
 def test_every_variant_has_a_row_in_the_papers_order() -> None:
-    text = variants_table(measured(**dict.fromkeys(reversed(ARMS), 0.1)))
+    text = variants_table(measured(**dict.fromkeys(reversed(METHODS), 0.1)))
     lines = [line for line in text.splitlines() if line.startswith("| ")][1:]
-    assert [line.split(" | ")[0][2:] for line in lines] == list(ARMS.values())
+    assert [line.split(" | ")[0][2:] for line in lines] == list(METHODS.values())
     assert "| 0.100 | 0.500 | 12.3 | 25.0 % | 0.90 | 1.10 |" in lines[0]
     assert (
         "3,000 steps of 4 crops of 256 px from 40 rendered scenes, learning rate "
@@ -90,9 +90,9 @@ def test_an_addition_that_was_not_trained_has_no_row() -> None:
 
 def test_it_is_told_what_each_addition_changed_against_the_row_before() -> None:
     found = measured(unfiltered=0.1, resdepth_stereo=0.1, robust=0.1, inputs=0.1)
-    arms = found["sets"]["rendered"]["arms"]
-    arms["robust"]["mae_ratio"] = 0.7  # 0.9 before
-    arms["inputs"] |= {"mae_ratio": 0.75, "medae_ratio": 1.11}  # 0.7, 1.1 before
+    methods = found["sets"]["rendered"]["methods"]
+    methods["robust"]["mae_ratio"] = 0.7  # 0.9 before
+    methods["inputs"] |= {"mae_ratio": 0.75, "medae_ratio": 1.11}  # 0.7, 1.1 before
     text = beyond_table(found)
     assert "MAE ratio lower with robust normalisation (-0.20), higher with " in text
     assert (
