@@ -4,30 +4,31 @@ import dataclasses
 from collections.abc import Iterable
 from pathlib import Path
 
-import numpy as np
-
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.io.colmap.depth_map import read_depth_map, read_map_size
+from resdepth_colmap.io.colmap.depth_map import read_map_size
 from resdepth_colmap.io.colmap.workspace import Workspace, original_map_path
-from resdepth_colmap.scene import Camera, DepthMap, Scene
+from resdepth_colmap.pipeline.fingerprints import Fingerprints
+from resdepth_colmap.scene import Camera, Scene
 
 AUTO = "auto"
 PREFERRED = "geometric"  # of two maps that are equally full
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class InitialMap:
     """The map that an image starts from.
 
     Attributes:
         kind: The word before ".bin" in its file name.
-        depth: Shape (H, W), in workspace units; 0 = hole.
+        path: Its file.
         filled: Share of pixels that have a depth, in 0..1.
+        digest: Of its content.
     """
 
     kind: str
-    depth: DepthMap
+    path: Path
     filled: float
+    digest: str
 
 
 def candidate_kinds(
@@ -48,26 +49,31 @@ def map_path(workspace: Workspace, name: str, kind: str) -> Path:
 
 
 def choose_initial_map(
-    workspace: Workspace, name: str, camera: Camera, kinds: Iterable[str]
+    workspace: Workspace,
+    name: str,
+    camera: Camera,
+    kinds: Iterable[str],
+    fingerprints: Fingerprints | None = None,
 ) -> InitialMap:
-    """Read the fullest of an image's maps; of equal ones the geometric.
+    """Choose the fullest of an image's maps; of equal ones the geometric.
 
     Args:
         workspace: Where the maps lie.
         name: Name of the image.
         camera: Its camera; a map may be smaller, never larger.
         kinds: What `candidate_kinds` gave, not empty.
+        fingerprints: Know maps that need not be read again.
 
     Raises:
         WorkspaceError: If a map is broken, or belongs to an image of another size.
     """
+    fingerprints = fingerprints or Fingerprints(workspace.path, {})
     maps = []
     for kind in kinds:
         path = map_path(workspace, name, kind)
         check_map_size(path, camera)
-        depth = read_depth_map(path)
-        filled = float(np.count_nonzero(depth) / depth.size)
-        maps.append(InitialMap(kind=kind, depth=depth, filled=filled))
+        digest, filled = fingerprints.of_map(path)
+        maps.append(InitialMap(kind=kind, path=path, filled=filled, digest=digest))
     return max(maps, key=lambda found: (found.filled, found.kind == PREFERRED))
 
 

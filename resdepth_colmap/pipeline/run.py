@@ -13,13 +13,16 @@ from resdepth_colmap.config import Fuser
 from resdepth_colmap.errors import FusionError
 from resdepth_colmap.io.colmap.model import read_scene
 from resdepth_colmap.io.colmap.output import OutputWorkspace, read_record, write_record
-from resdepth_colmap.io.colmap.workspace import Workspace, check_images, open_workspace
+from resdepth_colmap.io.colmap.workspace import check_images, open_workspace
 from resdepth_colmap.io.point_cloud import write_cloud
-from resdepth_colmap.network.device import resolve_device
-from resdepth_colmap.network.weights import load_weights
 from resdepth_colmap.pipeline.fuse.stage import fuse_initial, fuse_workspace
 from resdepth_colmap.pipeline.fuse.to_file import cloud_before_path, cloud_path
-from resdepth_colmap.pipeline.refine.stage import RefineReport, refine_workspace
+from resdepth_colmap.pipeline.refine.stage import (
+    Network,
+    RefineReport,
+    load_network,
+    refine_views,
+)
 from resdepth_colmap.pipeline.run_config import RunConfig
 from resdepth_colmap.pipeline.stereo.stage import StereoReport, stereo_workspace
 from resdepth_colmap.progress import Progress, SilentProgress
@@ -79,11 +82,11 @@ def run_refine(
     workspace = open_workspace(path)
     scene = read_scene(workspace.sparse_path, workspace.images_path, workspace.path)
     check_images(workspace, scene)
-    resolve_device(config.refine.device)
-    load_weights(config.refine.weights)
+    network = load_network(config.refine)
     output = OutputWorkspace(source=workspace, in_place=config.in_place)
     output.prepare([view.name for view in scene.views])
-    return _Run(workspace, scene, config, output, progress or SilentProgress()).run()
+    run = _Run(scene, config, output, network, progress or SilentProgress())
+    return run.run()
 
 
 class _Run:
@@ -91,13 +94,14 @@ class _Run:
 
     def __init__(
         self,
-        workspace: Workspace,
         scene: Scene,
         config: RunConfig,
         output: OutputWorkspace,
+        network: Network,
         progress: Progress,
     ) -> None:
-        self.workspace = workspace
+        self.workspace = output.source
+        self.network = network
         self.scene = scene
         self.config = config
         self.output = output
@@ -133,13 +137,13 @@ class _Run:
 
     def _refine(self) -> RefineReport:
         with self._timed("refine"):
-            return refine_workspace(
-                self.workspace,
+            return refine_views(
+                self.output,
+                self.scene,
                 self.config.refine,
-                scene=self.scene,
-                in_place=self.config.in_place,
-                overwrite=self.config.overwrite,
-                progress=self.progress,
+                self.network,
+                self.config.overwrite,
+                self.progress,
             )
 
     def _fuse(self, result: RunResult) -> RunResult:

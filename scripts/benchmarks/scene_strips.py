@@ -86,7 +86,6 @@ def scene_strips(
     if not linked_maps(scene, copy) and not _has_maps(copy):
         _match(scene, copy, cache)
     report = refine_workspace(
-        copy.workspace, config, scene=copy.scene, progress=progress
     )
     draw_workspace(report.output, copy.scene, report, progress)
     with_truth = [

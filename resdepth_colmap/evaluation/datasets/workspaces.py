@@ -143,11 +143,11 @@ def _initial(workspace: Workspace, view: View) -> InitialDepth | None:
     if not kinds:
         return None
     found = choose_initial_map(workspace, view.name, view.camera, kinds)
-    path = workspace.depth_map_path(view.name, found.kind)
-    _check_shape(path, found.depth.shape, view)
+    depth = read_depth_map(found.path)
+    _check_shape(found.path, depth.shape, view)
     if not found.filled:
-        raise WorkspaceError(f"{path}: no pixel has a depth; compute it again.")
-    return InitialDepth(depth=found.depth, origin=f"{found.kind} maps in stereo/")
+        raise WorkspaceError(f"{found.path}: no pixel has a depth; compute it again.")
+    return InitialDepth(depth=depth, origin=f"{found.kind} maps in stereo/")
 
 
 def _map_of(workspace: Workspace, view: View) -> DepthMap | None:
@@ -156,7 +156,8 @@ def _map_of(workspace: Workspace, view: View) -> DepthMap | None:
     if not kinds:
         return None
     found = choose_initial_map(workspace, view.name, view.camera, kinds)
-    return nearest_depth(found.depth, (view.camera.height_px, view.camera.width_px))
+    size_px = (view.camera.height_px, view.camera.width_px)
+    return nearest_depth(read_depth_map(found.path), size_px)
 
 
 def _check_shape(path: Path, shape: tuple[int, ...], view: View) -> None:

@@ -1,5 +1,6 @@
 """COLMAP's map files: `W&H&C&`, then planes of little-endian float32."""
 
+import os
 import re
 from pathlib import Path
 
@@ -24,24 +25,16 @@ def read_planes(path: Path, num_channels: int) -> npt.NDArray[np.float32]:
         WorkspaceError: If the file is not there, has a wrong number of channels, or
             holds more or fewer bytes than its header says.
     """
-    header = _read_header(path)
-    width, height, channels, num_header_bytes = _parse_header(path, header)
-    if channels != num_channels:
-        raise WorkspaceError(
-            f"{path}: the header says {channels} channels but expected {num_channels}; "
-            "depth maps have 1, normal maps 3."
-        )
-    # Before anything is allocated: the header may claim terabytes.
-    num_expected = num_header_bytes + 4 * width * height * channels
-    num_present = path.stat().st_size
-    if num_present != num_expected:
-        raise WorkspaceError(
-            f"{path}: the header says {width} x {height} x {channels}, that is "
-            f"{num_expected} bytes, but the file has {num_present}; "
-            "it is truncated or no map, compute it again."
-        )
-    values = np.fromfile(path, dtype="<f4", offset=num_header_bytes)
-    return values.reshape(channels, height, width).astype(np.float32, copy=False)
+    try:
+        with path.open("rb") as file:
+            header = file.read(_LONGEST_HEADER)
+            num_present = os.fstat(file.fileno()).st_size
+            shape, num_header_bytes = _checked(path, header, num_present, num_channels)
+            file.seek(num_header_bytes)
+            values = np.fromfile(file, dtype="<f4")
+    except OSError as error:
+        raise _unreadable(path, error) from error
+    return values.reshape(shape).astype(np.float32, copy=False)
 
 
 def read_size(path: Path) -> tuple[int, int]:
@@ -65,13 +58,37 @@ def write_planes(path: Path, planes: npt.NDArray[np.float32]) -> None:
     write_whole(path, header + np.ascontiguousarray(planes, dtype="<f4").tobytes())
 
 
+def _checked(
+    path: Path, header: bytes, num_present: int, num_channels: int
+) -> tuple[tuple[int, int, int], int]:
+    """Shape of the map and size of its header; nothing is allocated before that."""
+    width, height, channels, num_header_bytes = _parse_header(path, header)
+    if channels != num_channels:
+        raise WorkspaceError(
+            f"{path}: the header says {channels} channels but expected {num_channels}; "
+            "depth maps have 1, normal maps 3."
+        )
+    num_expected = num_header_bytes + 4 * width * height * channels
+    if num_present != num_expected:
+        raise WorkspaceError(
+            f"{path}: the header says {width} x {height} x {channels}, that is "
+            f"{num_expected} bytes, but the file has {num_present}; "
+            "it is truncated or no map, compute it again."
+        )
+    return (channels, height, width), num_header_bytes
+
+
 def _read_header(path: Path) -> bytes:
     try:
         with path.open("rb") as file:
             return file.read(_LONGEST_HEADER)
     except OSError as error:
-        reason = error.strerror or str(error)
-        raise WorkspaceError(f"{path}: cannot read the map ({reason}).") from error
+        raise _unreadable(path, error) from error
+
+
+def _unreadable(path: Path, error: OSError) -> WorkspaceError:
+    reason = error.strerror or str(error)
+    return WorkspaceError(f"{path}: cannot read the map ({reason}).")
 
 
 def _parse_header(path: Path, header: bytes) -> tuple[int, int, int, int]:

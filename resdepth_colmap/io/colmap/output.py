@@ -83,6 +83,14 @@ class OutputWorkspace:
         file_name = f"{safe_name(name)}.{KIND}.bin"
         return self.workspace.stereo_path / "confidence_maps" / file_name
 
+    def map_paths(self, name: str) -> tuple[Path, ...]:
+        """All maps of an image that `write_maps` writes."""
+        return (
+            self.depth_map_path(name),
+            self.normal_map_path(name),
+            self.confidence_map_path(name),
+        )
+
     def prepare(self, names: Sequence[str]) -> None:
         """Make the folders, and link images and model; doing it again is fine.
 

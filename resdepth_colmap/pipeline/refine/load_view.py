@@ -1,12 +1,35 @@
-"""One view of a workspace, as arrays ready to be refined."""
+"""What a task reads, as arrays ready to be refined."""
 
 from collections.abc import Mapping, Sequence
 
 from resdepth_colmap.geometry.pixels import index_K
+from resdepth_colmap.io.colmap.depth_map import read_depth_map
 from resdepth_colmap.pipeline.refine.cross_view import SourceMap
+from resdepth_colmap.pipeline.refine.plan import ViewTask
 from resdepth_colmap.pipeline.refine.view import SourceView, ViewInputs
 from resdepth_colmap.pipeline.view_images import ViewImages, camera_at_scale
 from resdepth_colmap.scene import DepthMap, Scene, View, cam_from_cam
+
+
+def load_view(task: ViewTask, scene: Scene, images: ViewImages) -> ViewInputs:
+    """Read all that a task needs; each depth map once.
+
+    Args:
+        task: The view, its sources and its maps.
+        scene: The views.
+        images: Loads the images.
+
+    Raises:
+        WorkspaceError: If an image or a map is missing or cannot be read.
+    """
+    return view_inputs(
+        scene,
+        task.index,
+        [choice.index for choice in task.sources],
+        read_depth_map(task.initial.path),
+        images,
+        {index: read_depth_map(path) for index, path in task.source_maps},
+    )
 
 
 def view_inputs(

@@ -1,5 +1,6 @@
-"""The loop over the views: rounds, and each view refined, written and recorded."""
+"""The loop over the tasks: load, refine, store."""
 
+import shutil
 import time
 from collections.abc import Sequence
 from typing import Any
@@ -8,245 +9,144 @@ import numpy as np
 
 from resdepth_colmap.config import RefineConfig
 from resdepth_colmap.geometry.view_selection import SourceChoice
-from resdepth_colmap.io.colmap.output import OutputWorkspace, read_record, write_record
-from resdepth_colmap.io.colmap.workspace import Workspace
+from resdepth_colmap.io.colmap.depth_map import write_depth_map
+from resdepth_colmap.io.colmap.output import OutputWorkspace
 from resdepth_colmap.network.unet import ResDepthNet
-from resdepth_colmap.pipeline.initial_map import (
-    InitialMap,
-    candidate_kinds,
-    choose_initial_map,
+from resdepth_colmap.pipeline.manifest import Manifest
+from resdepth_colmap.pipeline.refine.load_view import load_view
+from resdepth_colmap.pipeline.refine.plan import (
+    ITERATIONS_FOLDER,
+    STAGE,
+    RefinePlan,
+    ViewTask,
 )
-from resdepth_colmap.pipeline.refine.load_view import view_inputs
-from resdepth_colmap.pipeline.refine.plan import ViewPlan
-from resdepth_colmap.pipeline.refine.round_maps import EarlierMaps
-from resdepth_colmap.pipeline.refine.view import RefinedView, refine_view
+from resdepth_colmap.pipeline.refine.view import RefinedView, ViewInputs, refine_view
 from resdepth_colmap.pipeline.view_images import ViewImages
 from resdepth_colmap.progress import Progress
-from resdepth_colmap.scene import DepthMap, Scene
+from resdepth_colmap.scene import Scene
 
 IMAGE_CACHE_BYTES = 1 << 28  # the next view's sources are often those of this one
 
-RECORD_KEY = "images"
-"""Where run.json holds what is known of each refined image."""
-
-EARLIER_FOLDER = "earlier_rounds"
-"""In the output: the maps of earlier rounds, as long as the last one is not done."""
-
 
 class RefineLoop:
-    """Refines the images one by one; holds what they share.
-
-    Attributes:
-        images: What is known of each refined or kept image, by name.
-    """
+    """Makes the results that are not fresh; holds what the tasks share."""
 
     def __init__(
         self,
-        workspace: Workspace,
         scene: Scene,
         config: RefineConfig,
         network: ResDepthNet,
         output: OutputWorkspace,
+        manifest: Manifest,
     ) -> None:
-        """Read the record of what is finished.
+        """Make nothing yet.
 
         Args:
-            workspace: Where images and initial maps lie.
-            scene: Its model.
+            scene: The views.
             config: Options.
             network: Ready for use.
             output: Where the maps go.
-
-        Raises:
-            WorkspaceError: If the record is broken.
+            manifest: Knows what is fresh.
         """
-        self.images: dict[str, dict[str, Any]] = {}
-        self._workspace = workspace
         self._scene = scene
         self._config = config
         self._network = network
         self._output = output
-        self._view_images = ViewImages(workspace, IMAGE_CACHE_BYTES)
-        self._earlier = EarlierMaps(folder=output.path / EARLIER_FOLDER)
-        self._record = read_record(output.record_path)
-        self._plans: dict[int, ViewPlan] = {}
+        self._manifest = manifest
+        self._images = ViewImages(output.source, IMAGE_CACHE_BYTES)
 
     def run(
-        self, plans: tuple[ViewPlan, ...], overwrite: bool, progress: Progress
-    ) -> tuple[list[str], list[str], list[tuple[str, str]]]:
-        """Refine what is not finished.
+        self, plan: RefinePlan, overwrite: bool, progress: Progress
+    ) -> tuple[ViewTask, ...]:
+        """Refine what is not fresh.
 
         Args:
-            plans: Of all images that can be refined.
-            overwrite: Refine what is finished, too.
-            progress: Is told of each image.
+            plan: The tasks.
+            overwrite: Refine what is fresh, too.
+            progress: Is told of each view.
 
         Returns:
-            Names of the images that were refined, of those that were kept, and of those
-            that turned out to have nothing to refine, each with the reason.
+            The tasks of the last iteration that were done now.
 
         Raises:
-            WorkspaceError: If a file is broken, or the result cannot be written.
+            WorkspaceError: If a file is broken, or a result cannot be written.
         """
-        self._plans = {plan.index: plan for plan in plans}
-        known = dict(self._record.get(RECORD_KEY, {}))
-        pending = []
-        for plan in plans:
-            name = self._name(plan)
-            if not overwrite and self._is_finished(name, plan, known):
-                self.images[name] = known[name]
-            else:
-                pending.append(plan)
-        kept, refined, empty = list(self.images), [], []
-        # A record must never vouch for maps that are about to be replaced.
-        self._save()
+        *_, last = plan.iterations
+        pending = [t for t in last if overwrite or not self._manifest.is_fresh(t)]
         if overwrite:
-            self._earlier.forget()
-        for number, wanted in enumerate(self._earlier_rounds(pending)):
-            self._refine_earlier(wanted, number, progress)
-        with progress.stage(_stage(pending), len(pending)) as advance:
-            for plan in pending:
-                reason = self._refine(plan)
-                if reason:
-                    empty.append((self._name(plan), reason))
-                else:
-                    refined.append(self._name(plan))
-                advance(1)
-        self._earlier.forget()
-        if self.images:
-            self._output.write_cfgs(self._in_order())
-        return refined, kept, empty
+            self._forget_earlier(plan)
+        for iteration, needed in enumerate(_needed(plan, pending)):
+            title = _title(iteration, len(plan.iterations))
+            missing = [t for t in needed if not self._manifest.is_fresh(t)]
+            tasks = pending if needed is pending else missing
+            with progress.stage(title, len(tasks)) as advance:
+                for task in tasks:
+                    self._do(task)
+                    advance(1)
+        self._forget_earlier(plan)
+        return tuple(pending)
 
-    def _is_finished(self, name: str, plan: ViewPlan, known: dict[str, Any]) -> bool:
-        record = known.get(name)
-        return (
-            isinstance(record, dict)
-            and record.get("fingerprint") == plan.fingerprints[-1]
-            and self._output.is_written(name)
-        )
-
-    def _earlier_rounds(self, pending: Sequence[ViewPlan]) -> list[list[ViewPlan]]:
-        """Of each round before the last one, the first first, what the next needs."""
-        rounds: list[list[ViewPlan]] = []
-        needed = list(pending)
-        for _ in range(len(pending[0].fingerprints) - 1 if pending else 0):
-            others = {index for plan in needed for index in plan.map_sources}
-            needed = [self._plans[i] for i in sorted(others & self._plans.keys())]
-            rounds.insert(0, needed)
-        return rounds
-
-    def _refine_earlier(
-        self, plans: Sequence[ViewPlan], number: int, progress: Progress
-    ) -> None:
-        """Make the maps of a round that the next one needs, but for those there are."""
-        missing = [
-            plan
-            for plan in plans
-            if not self._earlier.has(self._name(plan), plan.fingerprints[number])
-        ]
-        with progress.stage(_stage(plans, number), len(missing)) as advance:
-            for plan in missing:
-                initial = self._initial_map(plan)
-                if initial.filled:
-                    depth = self._refined(plan, initial, number).depth
-                    fingerprint = plan.fingerprints[number]
-                    self._earlier.write(self._name(plan), fingerprint, depth)
-                advance(1)
-
-    def _refine(self, plan: ViewPlan) -> str:
-        """Refine one image in the last round, record it; returns why not, or ""."""
+    def _do(self, task: ViewTask) -> None:
         start = time.perf_counter()
-        initial, name = self._initial_map(plan), self._name(plan)
-        if not initial.filled:
-            return f"its {initial.kind} depth map has no depth at all"
-        result = self._refined(plan, initial, len(plan.fingerprints) - 1)
-        self._output.write_maps(name, result.depth, result.normals, result.confidence)
-        seconds = time.perf_counter() - start
-        self.images[name] = _image_record(plan, self._scene, initial, result)
-        self.images[name]["seconds"] = round(seconds, 3)
-        self._save()
-        return ""
+        data = load_view(task, self._scene, self._images)
+        result = refine_view(data, self._network, self._config)
+        self._manifest.start(task)
+        facts = {}
+        if task.stage == STAGE:
+            self._output.write_maps(
+                task.name, result.depth, result.normals, result.confidence
+            )
+            facts = view_record(task, self._scene, data, result)
+            facts["seconds"] = round(time.perf_counter() - start, 3)
+        else:
+            write_depth_map(task.writes[0], result.depth)
+        self._manifest.finish(task, facts)
 
-    def _refined(self, plan: ViewPlan, initial: InitialMap, number: int) -> RefinedView:
-        inputs = view_inputs(
-            self._scene,
-            plan.index,
-            [choice.index for choice in plan.sources],
-            initial.depth,
-            self._view_images,
-            self._maps_of_others(plan, number),
-        )
-        return refine_view(inputs, self._network, self._config)
-
-    def _maps_of_others(self, plan: ViewPlan, number: int) -> dict[int, DepthMap]:
-        """What the round before made of the others' maps; else the initial ones."""
-        maps = {}
-        for index in plan.map_sources:
-            depth = self._earlier_map(index, number - 1) if number > 0 else None
-            depth = self._initial_depth(index) if depth is None else depth
-            if depth is not None:
-                maps[index] = depth
-        return maps
-
-    def _earlier_map(self, index: int, number: int) -> DepthMap | None:
-        plan = self._plans.get(index)
-        if plan is None:
-            return None
-        return self._earlier.read(self._name(plan), plan.fingerprints[number])
-
-    def _initial_depth(self, index: int) -> DepthMap | None:
-        view = self._scene.views[index]
-        kinds = candidate_kinds(self._workspace, view.name, self._config.input)
-        if not kinds:
-            return None
-        return choose_initial_map(self._workspace, view.name, view.camera, kinds).depth
-
-    def _initial_map(self, plan: ViewPlan) -> InitialMap:
-        view = self._scene.views[plan.index]
-        return choose_initial_map(self._workspace, view.name, view.camera, plan.kinds)
-
-    def _name(self, plan: ViewPlan) -> str:
-        return self._scene.views[plan.index].name
-
-    def _save(self) -> None:
-        self._record = {**self._record, RECORD_KEY: self.images}
-        write_record(self._output.record_path, self._record)
-
-    def _in_order(self) -> list[str]:
-        return [view.name for view in self._scene.views if view.name in self.images]
+    def _forget_earlier(self, plan: RefinePlan) -> None:
+        for tasks in plan.iterations[:-1]:
+            for stage in {task.stage for task in tasks}:
+                self._manifest.forget(stage)
+        shutil.rmtree(self._output.path / ITERATIONS_FOLDER, ignore_errors=True)
 
 
-def _stage(plans: Sequence[ViewPlan], number: int = -1) -> str:
-    """What a round is called; the last one if no number says which."""
-    count = len(plans[0].fingerprints) if plans else 1
-    return "Refining" if count == 1 else f"Refining, round {number % count + 1}"
+def _needed(plan: RefinePlan, pending: list[ViewTask]) -> list[list[ViewTask]]:
+    """Of each iteration the tasks whose maps the next one's tasks look at."""
+    needed = [pending]
+    for tasks in reversed(plan.iterations[:-1]):
+        looked_at = {index for task in needed[0] for index, _ in task.source_maps}
+        needed.insert(0, [task for task in tasks if task.index in looked_at])
+    return needed
 
 
-def _image_record(
-    plan: ViewPlan, scene: Scene, initial: InitialMap, result: RefinedView
+def _title(iteration: int, num_iterations: int) -> str:
+    return "Refining" if num_iterations == 1 else f"Refining, round {iteration + 1}"
+
+
+def view_record(
+    task: ViewTask, scene: Scene, data: ViewInputs, result: RefinedView
 ) -> dict[str, Any]:
-    """What run.json says of an image."""
-    known = (initial.depth > 0) & (result.depth > 0)
-    before, after = initial.depth[known], result.depth[known]
+    """What run.json says of a refined image."""
+    known = (data.depth > 0) & (result.depth > 0)
+    before, after = data.depth[known], result.depth[known]
     change = float(np.median(np.abs(after - before) / before)) if known.any() else 0.0
     return {
-        "input": initial.kind,
-        "sources": [
-            {"name": scene.views[choice.index].name, **_choice_facts(choice)}
-            for choice in plan.sources
-        ],
-        "source_maps": [scene.views[index].name for index in plan.map_sources],
-        "filled_before": round(initial.filled, 6),
+        "input": task.initial.kind,
+        "sources": _sources(task.sources, scene),
+        "source_maps": [scene.views[index].name for index, _ in task.source_maps],
+        "filled_before": round(task.initial.filled, 6),
         "filled_after": round(float(np.mean(result.depth > 0)), 6),
         "median_relative_change": round(change, 6),
-        "fingerprint": plan.fingerprints[-1],
     }
 
 
-def _choice_facts(choice: SourceChoice) -> dict[str, Any]:
-    return {
-        "reason": choice.reason,
-        "num_shared_points": choice.num_shared_points,
-        "angle_deg": round(choice.angle_deg, 3),
-        "baseline": round(choice.baseline, 6),
-    }
+def _sources(choices: Sequence[SourceChoice], scene: Scene) -> list[dict[str, Any]]:
+    return [
+        {
+            "name": scene.views[choice.index].name,
+            "reason": choice.reason,
+            "num_shared_points": choice.num_shared_points,
+            "angle_deg": round(choice.angle_deg, 3),
+            "baseline": round(choice.baseline, 6),
+        }
+        for choice in choices
+    ]

@@ -1,113 +1,290 @@
-"""What is refined from what: for each image its map, its second views, its hash."""
+"""What is refined from what: a list of tasks an outer iteration."""
 
 import dataclasses
-import hashlib
 import importlib.metadata
-import json
 import logging
-from collections.abc import Iterable, Mapping
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from resdepth_colmap.config import RefineConfig
 from resdepth_colmap.geometry.view_selection import SourceChoice, choose_sources
 from resdepth_colmap.io.colmap.cfg import SourceKind, read_sources
+from resdepth_colmap.io.colmap.output import OutputWorkspace
 from resdepth_colmap.io.colmap.workspace import Workspace
-from resdepth_colmap.pipeline.initial_map import candidate_kinds, map_path
-from resdepth_colmap.scene import Scene, View
+from resdepth_colmap.io.files import safe_name
+from resdepth_colmap.network.network_config import NetworkConfig
+from resdepth_colmap.pipeline.initial_map import (
+    InitialMap,
+    candidate_kinds,
+    choose_initial_map,
+)
+from resdepth_colmap.pipeline.manifest import Manifest, Task, key_of, view_facts
+from resdepth_colmap.pipeline.refine.cross_view import NUM_SOURCE_MAPS
+from resdepth_colmap.scene import Scene
 
 logger = logging.getLogger(__name__)
+
+STAGE = "refine"
+ITERATIONS_FOLDER = "outer_iterations"
+"""In the output: the maps of the iterations before the last, until that is done."""
 
 Skipped = tuple[tuple[str, str], ...]
 """Name and reason of each image that is not refined."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class ViewPlan:
-    """What an image is refined from.
+class ViewTask(Task):
+    """One view to refine in one outer iteration.
 
     Attributes:
-        index: Its place in the scene.
-        kinds: The maps to choose from.
+        index: Of the view in the scene.
+        iteration: Outer iteration, from 0.
+        initial: The depth map that it starts from.
         sources: Its second views, best first; () for a network that needs none.
-        map_sources: Positions of the views whose depth maps are looked at.
-        fingerprints: For each round a hash of all that its refined map depends on.
+        source_maps: Views whose depth maps it is compared with, by index, and the file
+            of each: its initial map, or what the iteration before made of it.
+        reads: All files that it reads: images and depth maps.
     """
 
     index: int
-    kinds: tuple[str, ...]
+    iteration: int
+    initial: InitialMap
     sources: tuple[SourceChoice, ...]
-    map_sources: tuple[int, ...]
-    fingerprints: tuple[str, ...]
+    source_maps: tuple[tuple[int, Path], ...]
+    reads: tuple[Path, ...]
 
 
-def plan_views(
-    workspace: Workspace,
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class RefinePlan:
+    """All tasks of the stage.
+
+    Attributes:
+        iterations: Of each outer iteration the tasks of all views, in the order of the
+            scene; the last one makes the result.
+        skipped: Images without a task.
+    """
+
+    iterations: tuple[tuple[ViewTask, ...], ...]
+    skipped: Skipped
+
+
+def plan_refine(
+    output: OutputWorkspace,
     scene: Scene,
-    requested: str,
-    nums: tuple[int, int],
-    options: dict[str, Any],
-) -> tuple[tuple[ViewPlan, ...], Skipped]:
-    """Decide what each image is refined from, without reading a map.
+    config: RefineConfig,
+    network: tuple[NetworkConfig, str],
+    manifest: Manifest,
+) -> RefinePlan:
+    """Decide what each image is refined from, and what it depends on.
+
+    Each image and each depth map is read at most once, and not at all where its
+    fingerprint is known.
 
     Args:
-        workspace: Where the maps lie.
-        scene: The views. An explicit list of sources in patch-match.cfg is what the
-            second views are chosen from; else all views are.
-        requested: The kind of map to start from, or auto.
-        nums: Second views that the network looks at, and maps of other views that are
-            looked at; each may be 0.
-        options: What else decides the result: it becomes part of the hash.
-
-    Returns:
-        The plans, in the order of the scene; and what is skipped, and why.
+        output: Where the results go, and whose workspace it is. An explicit list of
+            sources in its patch-match.cfg is what the second views are chosen from;
+            else all views are.
+        scene: The views.
+        config: Options.
+        network: The network's configuration, and the hash of its weights.
+        manifest: Its fingerprints are asked.
 
     Raises:
-        WorkspaceError: If patch-match.cfg is malformed.
+        WorkspaceError: If patch-match.cfg is malformed, or a map is broken or of
+            another image.
     """
-    listed = _listed_sources(workspace, scene)
-    num_sources, num_maps = nums
-    plans, skipped = [], []
-    for index, view in enumerate(scene.views):
-        kinds = candidate_kinds(workspace, view.name, requested)
-        if not kinds:
-            skipped.append((view.name, _no_map(workspace, view.name, requested)))
-            continue
-        sources: tuple[SourceChoice, ...] = ()
-        if num_sources or num_maps:
-            most = max(num_sources, num_maps)
-            sources = choose_sources(scene, index, most, listed.get(view.name))
-        if num_sources and not sources:
-            skipped.append((view.name, "no other view overlaps with it"))
-            continue
-        plan = ViewPlan(
-            index=index,
-            kinds=kinds,
-            sources=sources[:num_sources],
-            map_sources=tuple(choice.index for choice in sources[:num_maps]),
-            fingerprints=(),
+    planner = _Planner(output, scene, config, network, manifest)
+    tasks, skipped = planner.first_iteration()
+    iterations = [tasks]
+    num_iterations = config.outer_iterations if network[0].source_depth else 1
+    for _ in range(num_iterations - 1):
+        iterations.append(planner.next_iteration(iterations[-1]))
+    return RefinePlan(
+        iterations=(*iterations[:-1], planner.as_results(iterations[-1])),
+        skipped=skipped,
+    )
+
+
+class _Planner:
+    """What the tasks of one plan share."""
+
+    def __init__(
+        self,
+        output: OutputWorkspace,
+        scene: Scene,
+        config: RefineConfig,
+        network: tuple[NetworkConfig, str],
+        manifest: Manifest,
+    ) -> None:
+        self.output = output
+        self.workspace = output.source
+        self.scene = scene
+        self.config = config
+        self.network_config, self.weights = network
+        self.fingerprints = manifest.fingerprints
+        self._first_keys: dict[int, str] = {}
+        self.initial = [self._initial_map(index) for index in range(len(scene.views))]
+
+    def first_iteration(self) -> tuple[tuple[ViewTask, ...], Skipped]:
+        """Each view compared with the initial maps of others."""
+        listed = _listed_sources(self.workspace, self.scene)
+        uses_sources = self.network_config.uses_sources
+        num_sources = self.network_config.num_sources if uses_sources else 0
+        num_maps = NUM_SOURCE_MAPS if self.network_config.source_depth else 0
+        tasks, skipped = [], []
+        for index, view in enumerate(self.scene.views):
+            initial = self.initial[index]
+            if initial is None:
+                skipped.append((view.name, self._no_map(view.name)))
+                continue
+            if not initial.filled:
+                reason = f"its {initial.kind} depth map has no depth at all"
+                skipped.append((view.name, reason))
+                continue
+            choices: tuple[SourceChoice, ...] = ()
+            if num_sources or num_maps:
+                most = max(num_sources, num_maps)
+                choices = choose_sources(self.scene, index, most, listed.get(view.name))
+            if num_sources and not choices:
+                skipped.append((view.name, "no other view overlaps with it"))
+                continue
+            others = tuple(choice.index for choice in choices[:num_maps])
+            tasks.append(self._first_task(index, choices[:num_sources], others))
+        return tuple(tasks), tuple(skipped)
+
+    def next_iteration(self, before: Sequence[ViewTask]) -> tuple[ViewTask, ...]:
+        """Each view compared with what the iteration before made of the others."""
+        made = {task.index: task for task in before}
+
+        def after(task: ViewTask) -> ViewTask:
+            maps, keys = [], []
+            for index, path in task.source_maps:
+                other = made.get(index)
+                maps.append((index, other.writes[0] if other else path))
+                keys.append(other.key if other else None)
+            iteration = task.iteration + 1
+            return dataclasses.replace(
+                task,
+                stage=_stage(iteration),
+                key=key_of([self._first_keys[task.index], keys]),
+                writes=self._earlier_map(task.name, iteration),
+                iteration=iteration,
+                source_maps=tuple(maps),
+                reads=self._reads(task.index, task.sources, tuple(maps)),
+            )
+
+        return tuple(after(task) for task in before)
+
+    def as_results(self, tasks: Sequence[ViewTask]) -> tuple[ViewTask, ...]:
+        """The same tasks with the maps of the output as what they write."""
+        paths = self.output.map_paths
+        return tuple(
+            dataclasses.replace(task, stage=STAGE, writes=paths(task.name))
+            for task in tasks
         )
-        fingerprint = _fingerprint(workspace, scene, plan, options)
-        plans.append(dataclasses.replace(plan, fingerprints=(fingerprint,)))
-    return tuple(plans), tuple(skipped)
+
+    def _first_task(
+        self, index: int, sources: tuple[SourceChoice, ...], others: tuple[int, ...]
+    ) -> ViewTask:
+        name, initial = self.scene.views[index].name, self._initial(index)
+        maps = tuple(
+            (other, found.path)
+            for other in others
+            if (found := self.initial[other]) is not None
+        )
+        return ViewTask(
+            stage=_stage(0),
+            name=name,
+            key=self._first_key(index, sources, others),
+            writes=self._earlier_map(name, 0),
+            index=index,
+            iteration=0,
+            initial=initial,
+            sources=sources,
+            source_maps=maps,
+            reads=self._reads(index, sources, maps),
+        )
+
+    def _first_key(
+        self, index: int, sources: tuple[SourceChoice, ...], others: tuple[int, ...]
+    ) -> str:
+        views = self.scene.views
+        seen = [views[index], *(views[choice.index] for choice in sources)]
+        initial = self._initial(index)
+        key = key_of(
+            {
+                "package": importlib.metadata.version("resdepth-colmap"),
+                "options": self._options(),
+                "views": [view_facts(view) for view in seen],
+                "images": [self._image(view.name) for view in seen],
+                "map": [initial.kind, initial.digest],
+                "source_maps": [
+                    [view_facts(views[other]), found.digest if found else None]
+                    for other in others
+                    for found in [self.initial[other]]
+                ],
+            }
+        )
+        self._first_keys[index] = key
+        return key
+
+    def _options(self) -> dict[str, Any]:
+        """What decides the result besides the views."""
+        return {
+            "inner_iterations": self.config.inner_iterations,
+            "update_gating": self.config.update_gating,
+            "tile_px": self.config.tile_px,
+            "overlap_px": self.config.overlap_px,
+            "weights": self.weights,
+            "in_place": self.output.in_place,
+        }
+
+    def _reads(
+        self,
+        index: int,
+        sources: tuple[SourceChoice, ...],
+        maps: tuple[tuple[int, Path], ...],
+    ) -> tuple[Path, ...]:
+        indices = (index, *(choice.index for choice in sources))
+        images = (self.scene.views[i].name for i in indices)
+        return (
+            *(self.workspace.image_path(name) for name in images),
+            self._initial(index).path,
+            *(path for _, path in maps),
+        )
+
+    def _initial(self, index: int) -> InitialMap:
+        found = self.initial[index]
+        assert found is not None  # noqa: S101 (a view with a task has a map)
+        return found
+
+    def _initial_map(self, index: int) -> InitialMap | None:
+        view = self.scene.views[index]
+        kinds = candidate_kinds(self.workspace, view.name, self.config.input)
+        if not kinds:
+            return None
+        return choose_initial_map(
+            self.workspace, view.name, view.camera, kinds, self.fingerprints
+        )
+
+    def _image(self, name: str) -> str | None:
+        path = self.workspace.image_path(name)
+        return self.fingerprints.of(path) if path.is_file() else None
+
+    def _earlier_map(self, name: str, iteration: int) -> tuple[Path]:
+        folder = self.output.path / ITERATIONS_FOLDER / str(iteration)
+        return (folder / f"{safe_name(name)}.bin",)
+
+    def _no_map(self, name: str) -> str:
+        kinds = self.workspace.original_kinds(name)
+        if not kinds:
+            return "no depth map"
+        return f"no {self.config.input} depth map (there is: {', '.join(kinds)})"
 
 
-def with_rounds(plans: tuple[ViewPlan, ...], num_rounds: int) -> tuple[ViewPlan, ...]:
-    """The same for so many rounds: each looks at the maps that the one before made.
-
-    Args:
-        plans: As `plan_views` makes them, for one round.
-        num_rounds: At least 1.
-    """
-    for _ in range(num_rounds - 1):
-        before = {plan.index: plan.fingerprints[-1] for plan in plans}
-        plans = tuple(_with_round(plan, before) for plan in plans)
-    return plans
-
-
-def _with_round(plan: ViewPlan, before: Mapping[int, str]) -> ViewPlan:
-    others = [before.get(index) for index in plan.map_sources]
-    fingerprint = _hashed([plan.fingerprints[0], others])
-    return dataclasses.replace(plan, fingerprints=(*plan.fingerprints, fingerprint))
+def _stage(iteration: int) -> str:
+    return f"{STAGE}, outer iteration {iteration}"
 
 
 def _listed_sources(workspace: Workspace, scene: Scene) -> dict[str, tuple[int, ...]]:
@@ -130,54 +307,3 @@ def _listed_sources(workspace: Workspace, scene: Scene) -> dict[str, tuple[int, 
                 name,
             )
     return listed
-
-
-def _no_map(workspace: Workspace, name: str, requested: str) -> str:
-    kinds = workspace.original_kinds(name)
-    if not kinds:
-        return "no depth map"
-    return f"no {requested} depth map (there is: {', '.join(kinds)})"
-
-
-def _fingerprint(
-    workspace: Workspace, scene: Scene, plan: ViewPlan, options: dict[str, Any]
-) -> str:
-    view = scene.views[plan.index]
-    views = [view, *(scene.views[source.index] for source in plan.sources)]
-    others = [scene.views[index] for index in plan.map_sources]
-    facts = {
-        "package": importlib.metadata.version("resdepth-colmap"),
-        "options": options,
-        "views": [_facts_of(v) for v in views],
-        "images": _stamps(workspace.image_path(v.name) for v in views),
-        "maps": [plan.kinds, _map_stamps(workspace, view.name, plan.kinds)],
-        "source_maps": [[_facts_of(v), _map_stamps(workspace, v.name)] for v in others],
-    }
-    return _hashed(facts)
-
-
-def _hashed(facts: Any) -> str:
-    text = json.dumps(facts, sort_keys=True, default=str)
-    return hashlib.sha256(text.encode()).hexdigest()
-
-
-def _facts_of(view: View) -> list[Any]:
-    camera = dataclasses.asdict(view.camera)
-    return [view.name, camera, view.cam_from_world.tolist()]
-
-
-def _map_stamps(
-    workspace: Workspace, name: str, kinds: Iterable[str] | None = None
-) -> list[tuple[int, int]]:
-    """Those of the maps of an image, of these kinds or of all."""
-    kinds = workspace.original_kinds(name) if kinds is None else kinds
-    return _stamps(map_path(workspace, name, kind) for kind in kinds)
-
-
-def _stamps(paths: Iterable[Path]) -> list[tuple[int, int]]:
-    """Size and time of files, (0, 0) for one that is not there: no file is read."""
-    stamps = []
-    for path in paths:
-        status = path.stat() if path.is_file() else None
-        stamps.append((status.st_size, status.st_mtime_ns) if status else (0, 0))
-    return stamps

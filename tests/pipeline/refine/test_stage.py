@@ -199,8 +199,12 @@ def test_a_lost_result_is_made_again_and_nothing_else(tmp_path: Path) -> None:
 def test_a_changed_source_image_means_again(tmp_path: Path) -> None:
     folder = plane_folder(tmp_path)
     users = users_of(NAMES[0], refine(folder))
-    status = (folder / "images" / NAMES[0]).stat()
-    os.utime(folder / "images" / NAMES[0], (status.st_atime, status.st_mtime + 5))
+    image = folder / "images" / NAMES[0]
+    status = image.stat()
+    os.utime(image, (status.st_atime, status.st_mtime + 5))
+    assert refine(folder).refined == ()  # what is in it counts, not its date
+    image.write_bytes(image.read_bytes() + b"\0")
+    os.utime(image, (status.st_atime, status.st_mtime))
     assert set(refine(folder).refined) == users
 
 
