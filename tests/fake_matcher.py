@@ -8,8 +8,8 @@ import pytest
 
 from resdepth_colmap.config import StereoConfig
 from resdepth_colmap.matching.patch_match import MatchResult, MatchView, Surface
-from resdepth_colmap.pipeline.stereo import passes as stereo_passes
 from resdepth_colmap.pipeline.stereo import stage as stereo
+from resdepth_colmap.pipeline.stereo import view as stereo_view
 from resdepth_colmap.scene import DepthMap
 
 DEPTH = 4.0
@@ -67,6 +67,6 @@ class FakeMatcher:
 def installed(monkeypatch: pytest.MonkeyPatch) -> FakeMatcher:
     """The stage "stereo" matches with a fake; nothing is compiled for it."""
     fake = FakeMatcher()
-    monkeypatch.setattr(stereo_passes, "match_view", fake)
+    monkeypatch.setattr(stereo_view, "match_view", fake)
     monkeypatch.setattr(stereo, "warm_up", lambda _: None)
     return fake

@@ -111,14 +111,19 @@ class Manifest:
         """Whether the stage has made anything here, or began to."""
         return any(entry_stage == stage for entry_stage, _ in self._entries)
 
+    def facts_of(self, stage: str) -> list[dict[str, Any]]:
+        """What was noted of each result of a stage, the latest last."""
+        entries = self._entries.items()
+        return [dict(entry.facts) for key, entry in entries if key[0] == stage]
+
     def facts(self, task: Task) -> dict[str, Any]:
         """What was noted of a result; {} if there is none."""
         entry = self._entries.get((task.stage, task.name))
         return dict(entry.facts) if entry else {}
 
-    def start(self, task: Task) -> None:
+    def start(self, task: Task, facts: Mapping[str, Any] | None = None) -> None:
         """A result is about to be written: nothing vouches for its files any more."""
-        self._add(task, Entry(key=IN_PROGRESS, files={}, facts={}))
+        self._add(task, Entry(key=IN_PROGRESS, files={}, facts=dict(facts or {})))
 
     def finish(self, task: Task, facts: Mapping[str, Any] | None = None) -> None:
         """A result is there.
@@ -165,6 +170,7 @@ class Manifest:
         )
 
     def _add(self, task: Task, entry: Entry) -> None:
+        self._entries.pop((task.stage, task.name), None)  # the latest is the last
         self._entries[task.stage, task.name] = entry
         self._append([_line(task.stage, task.name, entry)])
 

@@ -14,9 +14,7 @@ from resdepth_colmap.errors import FusionError
 from resdepth_colmap.io.colmap.model import read_scene
 from resdepth_colmap.io.colmap.output import OutputWorkspace, read_record, write_record
 from resdepth_colmap.io.colmap.workspace import check_images, open_workspace
-from resdepth_colmap.io.point_cloud import write_cloud
-from resdepth_colmap.pipeline.fuse.stage import fuse_initial, fuse_workspace
-from resdepth_colmap.pipeline.fuse.to_file import cloud_before_path, cloud_path
+from resdepth_colmap.pipeline.fuse.to_file import Clouds, cloud_path
 from resdepth_colmap.pipeline.refine.stage import (
     Network,
     RefineReport,
@@ -30,9 +28,6 @@ from resdepth_colmap.scene import Scene
 from resdepth_colmap.versions import peak_memory_mb, versions
 
 logger = logging.getLogger(__name__)
-
-MOST_POINTS_SHOWN = 150_000
-"""Points that are kept of a cloud which is there to be shown."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -148,38 +143,26 @@ class _Run:
 
     def _fuse(self, result: RunResult) -> RunResult:
         path = cloud_path(self.output, self.config.cloud_format)
+        overwrite = self.config.overwrite
+        clouds = Clouds(self.output, self.scene, self.config.fuse, self.progress)
         with self._timed("fuse"):
-            fused = fuse_workspace(
-                self.output, self.scene, self.config.fuse, self.progress
-            )
-            write_cloud(path, fused.cloud)
-        result = dataclasses.replace(
-            result, cloud_path=path, num_points=len(fused.cloud)
-        )
+            fused = clouds.refined(path, overwrite)
+        num_before = None
         # COLMAP's fusion keeps no account that could be compared.
         if self.config.fuse.fuser is Fuser.OPEN3D:
-            result = self._fuse_before(result)
-        self.facts["fuse"] = {
-            "points": len(fused.cloud),
-            "points_before_refinement": result.num_points_before,
-            "thinned": fused.num_thinned,
-            "outliers": fused.num_outliers,
-            **dataclasses.asdict(fused.statistics),
-        }
-        return result
-
-    def _fuse_before(self, result: RunResult) -> RunResult:
-        kinds = {name: facts["input"] for name, facts in result.refine.images.items()}
-        with self._timed("fuse_before"):
-            before = fuse_initial(
-                self.workspace, self.scene, kinds, self.config.fuse, self.progress
-            )
-        self.facts["fuse_before"] = dataclasses.asdict(before.statistics)
-        path = cloud_before_path(self.output)
-        path.unlink(missing_ok=True)
-        if len(before.cloud):
-            write_cloud(path, before.cloud.sampled(MOST_POINTS_SHOWN))
-        return dataclasses.replace(result, num_points_before=len(before.cloud))
+            images = result.refine.images.items()
+            kinds = {name: facts["input"] for name, facts in images}
+            with self._timed("fuse_before"):
+                before = clouds.initial(kinds, overwrite)
+            self.facts["fuse_before"] = before
+            num_before = before["num_points"]
+        self.facts["fuse"] = {**fused, "points_before_refinement": num_before}
+        return dataclasses.replace(
+            result,
+            cloud_path=path,
+            num_points=fused["points"],
+            num_points_before=num_before,
+        )
 
     def _draw(self, result: RunResult) -> RunResult:
         from resdepth_colmap.pipeline.pictures import draw_workspace  # fonts: slow

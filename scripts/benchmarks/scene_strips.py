@@ -85,8 +85,7 @@ def scene_strips(
     _copy_config(scene, copy)
     if not linked_maps(scene, copy) and not _has_maps(copy):
         _match(scene, copy, cache)
-    report = refine_workspace(
-    )
+    report = refine_workspace(copy.workspace, config, progress=progress)
     draw_workspace(report.output, copy.scene, report, progress)
     with_truth = [
         name for name in report.images if copy.workspace.truth_path(name).is_file()

@@ -76,7 +76,7 @@ def fuse_workspace(
         WorkspaceError: If a map cannot be read.
         ConfigError: If the voxels are too small for the extent of the cloud.
     """
-    files = _refined_files(output, scene)
+    files = refined_files(output, scene)
     if not files:
         raise FusionError(
             f"{output.workspace.stereo_path}: no refined map to fuse; run "
@@ -113,7 +113,15 @@ def fuse_initial(
     Raises:
         WorkspaceError: If a map cannot be read.
     """
-    files = [
+    files = initial_files(workspace, scene, kinds)
+    return fuse_maps(files, scene, config, progress, "Fusing as it was")
+
+
+def initial_files(
+    workspace: Workspace, scene: Scene, kinds: Mapping[str, str]
+) -> list[MapFiles]:
+    """The maps before the refinement, of the kind that was refined of each image."""
+    return [
         MapFiles(
             view=view,
             image_path=workspace.image_path(view.name),
@@ -122,7 +130,6 @@ def fuse_initial(
         for view in scene.views
         if view.name in kinds
     ]
-    return fuse_maps(files, scene, config, progress, "Fusing as it was")
 
 
 def fuse_maps(
@@ -144,13 +151,14 @@ def fuse_maps(
     Raises:
         WorkspaceError: If a map cannot be read.
     """
-    neighbours = _neighbours(files, scene)
+    neighbours = neighbours_of(files, scene)
     views = LazyViews(files, MAX_NUM_BYTES)
     with (progress or SilentProgress()).stage(title, len(files)) as advance:
         return fuse_views(views, neighbours, config, advance)
 
 
-def _refined_files(output: OutputWorkspace, scene: Scene) -> list[MapFiles]:
+def refined_files(output: OutputWorkspace, scene: Scene) -> list[MapFiles]:
+    """The refined maps of a workspace, in the order of its views."""
     return [
         MapFiles(
             view=view,
@@ -164,8 +172,8 @@ def _refined_files(output: OutputWorkspace, scene: Scene) -> list[MapFiles]:
     ]
 
 
-def _neighbours(files: Sequence[MapFiles], scene: Scene) -> list[list[int]]:
-    """Of each map the places in `files` of those to compare it with, best first."""
+def neighbours_of(files: Sequence[MapFiles], scene: Scene) -> list[list[int]]:
+    """Of each map the indices in `files` of those to compare it with, best first."""
     if not files:
         return []
     sizes = [read_map_size(file.depth_path) for file in files]

@@ -15,7 +15,7 @@ from resdepth_colmap.config import StereoConfig
 from resdepth_colmap.matching.filtering import filter_result
 from resdepth_colmap.matching.patch_match import MatchView, match_view
 
-SIDE_PX = 200
+PROBE_SIDE_PX = 200
 """Longest side of the pictures."""
 
 WIDE = 5.0
@@ -32,6 +32,12 @@ FAR_STRETCH = 4.0
 small picture, and costs little: the search is uniform in inverse depth."""
 
 
+def is_wide(depth_range: tuple[float, float]) -> bool:
+    """Whether a range (near, far) is too wide to search without a probe."""
+    near, far = depth_range
+    return far > WIDE * near
+
+
 def probed_range(
     reference: MatchView,
     sources: Sequence[MatchView],
@@ -41,7 +47,7 @@ def probed_range(
     """Near and far depth of what is confirmed in small pictures.
 
     Args:
-        reference: The view, at a size of about `SIDE_PX`.
+        reference: The view, at a size of about `PROBE_SIDE_PX`.
         sources: Its sources, at the same scale.
         wide_range: The range known from the poses; the result lies within.
         config: Options of the matcher.

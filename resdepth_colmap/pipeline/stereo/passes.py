@@ -1,4 +1,4 @@
-"""The CPU PatchMatch over a workspace: pass by pass, view by view.
+"""The two passes of PatchMatch, as tasks.
 
 As in COLMAP (patch_match.cc), the first pass matches the photographs of all views,
 unfiltered; the second matches each view again, against the first one's depth maps of
@@ -6,40 +6,31 @@ its sources, too.
 """
 
 import dataclasses
-import functools
-
-import numpy as np
-import numpy.typing as npt
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
 from resdepth_colmap.config import StereoConfig
-from resdepth_colmap.geometry.holes import fill_holes
-from resdepth_colmap.geometry.normals import normals_from_depth
-from resdepth_colmap.geometry.pixels import index_K
-from resdepth_colmap.io.colmap.consistency_graph import write_consistency_graph
-from resdepth_colmap.io.colmap.depth_map import write_depth_map
-from resdepth_colmap.io.colmap.masks import Wanted, mask_file, read_mask
-from resdepth_colmap.io.colmap.model import read_image_indices
-from resdepth_colmap.io.colmap.normal_map import read_normal_map, write_normal_map
+from resdepth_colmap.io.colmap.masks import mask_file
 from resdepth_colmap.io.colmap.workspace import Workspace
-from resdepth_colmap.matching.filtering import filter_result
-from resdepth_colmap.matching.patch_match import MatchView, Surface, match_view
-from resdepth_colmap.pipeline.stereo.depth_range_probe import (
-    SIDE_PX,
-    WIDE,
-    probed_range,
-)
-from resdepth_colmap.pipeline.stereo.ledger import (
-    GEOMETRIC,
-    PHOTOMETRIC,
-    UNFINISHED,
-    StereoLedger,
-)
+from resdepth_colmap.matching.patch_match import METHOD
+from resdepth_colmap.pipeline.manifest import Manifest, Task, key_of, view_facts
 from resdepth_colmap.pipeline.stereo.plan import StereoPlan
-from resdepth_colmap.pipeline.view_images import ViewImages, camera_at_scale
-from resdepth_colmap.progress import Advance
-from resdepth_colmap.scene import Camera, DepthMap, NormalMap, Scene, View
+from resdepth_colmap.scene import Scene
 
-BYTES_PER_GB = 1 << 30  # COLMAP's unit of cache_size
+STAGE = "stereo"
+PHOTOMETRIC = "photometric"
+GEOMETRIC = "geometric"
+
+_DECIDE_NOTHING = (
+    "cache_size",
+    "depth_max",
+    "depth_min",
+    "mask_path",
+    "max_num_sources",
+    "min_triangulation_angle",
+)
+"""Options that decide nothing, or only what is part of a key by itself."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -57,6 +48,19 @@ class StereoPass:
     num_units: int = 1
 
 
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class MatchTask(Task):
+    """One view to match in one pass.
+
+    Attributes:
+        plan: The view, its sources, its depth range.
+        which: The pass.
+    """
+
+    plan: StereoPlan
+    which: StereoPass
+
+
 def passes_of(config: StereoConfig) -> tuple[StereoPass, ...]:
     """The passes of a configuration; only the last one is filtered."""
     if not config.geom_consistency:
@@ -67,195 +71,126 @@ def passes_of(config: StereoConfig) -> tuple[StereoPass, ...]:
     )
 
 
-class ViewMatcher:
-    """Matches views of a workspace, and writes what it finds."""
+def match_tasks(
+    workspace: Workspace,
+    scene: Scene,
+    plans: Sequence[StereoPlan],
+    config: StereoConfig,
+    manifest: Manifest,
+) -> list[list[MatchTask]]:
+    """The tasks of each pass, in the order of the plans.
+
+    Raises:
+        WorkspaceError: If an image, a mask or a map cannot be read.
+    """
+    keys = _Keys(workspace, scene, config, manifest)
+    tasks: list[list[MatchTask]] = []
+    for which in passes_of(config):
+        first = {task.plan.index: task for task in tasks[0]} if tasks else {}
+        tasks.append([])
+        for plan in plans:
+            name = scene.views[plan.index].name
+            key = keys.photometric(plan)
+            if which.kind == GEOMETRIC:
+                key = keys.geometric(plan, first)
+            writes = (
+                workspace.depth_map_path(name, which.kind),
+                workspace.normal_map_path(name, which.kind),
+            )
+            if which.is_filtered and config.write_consistency_graph:
+                graph = workspace.consistency_graph_path(name, which.kind)
+                writes = (*writes, graph)  # type: ignore[assignment] # one more
+            tasks[-1].append(
+                MatchTask(
+                    stage=STAGE,
+                    name=f"{name}.{which.kind}",
+                    key=key,
+                    writes=writes,
+                    plan=plan,
+                    which=which,
+                )
+            )
+    return tasks
+
+
+def recorded_config(manifest: Manifest) -> StereoConfig | None:
+    """The options that the maps of a workspace were made with; None: none is ours."""
+    options: dict[str, Any] = {}
+    for facts in manifest.facts_of(STAGE):
+        options = dict(facts.get("options") or options)
+    if not manifest.has_any(STAGE):
+        return None
+    mask_path = options.get("mask_path")
+    options["mask_path"] = None if mask_path is None else Path(mask_path)
+    return StereoConfig.from_mapping(options)
+
+
+def is_fresh(task: MatchTask, manifest: Manifest) -> bool:
+    """Whether a task need not be done: its maps are somebody else's, or fresh."""
+    return not is_replaceable(task, manifest) or manifest.is_fresh(task)
+
+
+def is_replaceable(task: MatchTask, manifest: Manifest) -> bool:
+    """Whether its depth map is of this program, or not there."""
+    return not task.writes[0].exists() or manifest.is_ours(task)
+
+
+class _Keys:
+    """Hashes of all that the maps of a view are made from."""
 
     def __init__(
         self,
         workspace: Workspace,
         scene: Scene,
         config: StereoConfig,
-        ledger: StereoLedger,
+        manifest: Manifest,
     ) -> None:
-        """Read nothing yet."""
         self.workspace = workspace
         self.scene = scene
         self.config = config
-        self.ledger = ledger
-        num_bytes = int(min(config.cache_size, 1 << 20) * BYTES_PER_GB)
-        self.images = ViewImages(workspace, num_bytes)
-        self._probed: dict[int, tuple[float, float]] = {}
+        self.manifest = manifest
 
-    def match(self, plan: StereoPlan, which: StereoPass, advance: Advance) -> str:
-        """Match a view and write its maps.
+    def photometric(self, plan: StereoPlan) -> str:
+        views = [self._view(index) for index in (plan.index, *plan.sources)]
+        facts = [self._options(PHOTOMETRIC), plan.depth_range, views]
+        return key_of([*facts, self._mask(plan.index)])
 
-        Args:
-            plan: The view.
-            which: The pass.
-            advance: Is told of each step; `which.num_units` for all of them.
+    def geometric(self, plan: StereoPlan, first: dict[int, MatchTask]) -> str:
+        indices = (plan.index, *plan.sources)
+        maps = [self._map(index, first.get(index)) for index in indices]
+        views = [self._view(index) for index in indices]
+        return key_of([self._options(GEOMETRIC), plan.depth_range, views, maps])
 
-        Returns:
-            Why there is nothing to match, or "".
+    def _map(self, index: int, task: MatchTask | None) -> str | None:
+        """What tells one photometric map from another: its input, or its file."""
+        if task is not None and is_replaceable(task, self.manifest):
+            return task.key
+        name = self.scene.views[index].name
+        path = self.workspace.depth_map_path(name, PHOTOMETRIC)
+        return self.manifest.fingerprints.of(path) if path.is_file() else None
 
-        Raises:
-            WorkspaceError: If a file cannot be read or written.
-        """
-        view = self.scene.views[plan.index]
-        camera = self._camera(view)
-        wanted = self._wanted(view, camera)
-        if not wanted.any():
-            self._write(plan, which, _nothing(camera), None)
-            advance(which.num_units)
-            return ""
-        start, source_depths, reason = None, None, ""
-        if which.kind == GEOMETRIC:
-            start, source_depths, reason = self._first_pass(plan, camera)
-        if reason:
-            advance(which.num_units)
-            return reason
-        reference, sources = self._match_views(plan, self.config.max_image_size)
-        result = match_view(
-            reference,
-            sources,
-            self._depth_range(plan),
-            self.config,
-            start=start,
-            source_depths=source_depths,
-            on_step=lambda _, total: advance(which.num_units / total),
-        )
-        found: Surface = result
-        agrees = None
-        if which.is_filtered:
-            found, agrees = filter_result(
-                result, reference, sources, source_depths, self.config
-            )
-        self._write(plan, which, masked(found, wanted), agrees)
-        return ""
+    def _view(self, index: int) -> list[Any]:
+        view = self.scene.views[index]
+        path = self.workspace.image_path(view.name)
+        image = self.manifest.fingerprints.of(path) if path.is_file() else None
+        return [*view_facts(view), image]
 
-    def _first_pass(
-        self, plan: StereoPlan, camera: Camera
-    ) -> tuple[Surface | None, list[DepthMap], str]:
-        """Where the second pass starts from, the depth of the sources, or why not."""
-        view = self.scene.views[plan.index]
-        depth = self.images.depth(view, camera, PHOTOMETRIC)
-        if not depth.any():
-            return None, [], "its photometric map has no depth at all"
-        others = self._sources(plan)
-        depths = [self.images.depth(v, self._camera(v), PHOTOMETRIC) for v in others]
-        if not any(found.any() for found in depths):
-            return None, [], "none of its sources has a photometric depth map"
-        whole = fill_holes(depth)
-        start = Surface(
-            depth=np.clip(whole, *self._depth_range(plan)).astype(np.float32),
-            normals=self._normals(view, camera, whole),
-        )
-        return start, depths, ""
+    def _mask(self, index: int) -> str | None:
+        folder = self.config.mask_path
+        if folder is None:
+            return None
+        path = mask_file(folder, self.scene.views[index].name)
+        return self.manifest.fingerprints.of(path) if path.is_file() else None
 
-    def _normals(self, view: View, camera: Camera, whole: DepthMap) -> NormalMap:
-        """Normals of the first pass; where it has none, those of its depth."""
-        path = self.workspace.normal_map_path(view.name, PHOTOMETRIC)
-        normals = np.zeros((*whole.shape, 3), np.float32)
-        if path.is_file():
-            normals = read_normal_map(path)
-        if normals.shape[:2] != whole.shape:
-            normals = np.zeros((*whole.shape, 3), np.float32)
-        known = normals.any(axis=2, keepdims=True)
-        if known.all():
-            return normals
-        computed = normals_from_depth(whole, index_K(camera))
-        return np.where(known, normals, computed)
-
-    def _write(
-        self,
-        plan: StereoPlan,
-        which: StereoPass,
-        found: Surface,
-        agrees: npt.NDArray[np.bool_] | None,
-    ) -> None:
-        """Write the maps, each whole or not at all."""
-        name, kind = self.scene.views[plan.index].name, which.kind
-        # What is interrupted between two files must not look finished.
-        self.ledger.add(name, kind, UNFINISHED)
-        if agrees is not None and self.config.write_consistency_graph:
-            write_consistency_graph(
-                self.workspace.consistency_graph_path(name, kind),
-                agrees & (found.depth > 0),
-                [self._model_indices[view.image_id] for view in self._sources(plan)],
-            )
-        normal_path = self.workspace.normal_map_path(name, kind)
-        write_normal_map(normal_path, found.normals)
-        write_depth_map(self.workspace.depth_map_path(name, kind), found.depth)
-
-    @functools.cached_property
-    def _model_indices(self) -> dict[int, int]:
-        return read_image_indices(self.workspace.sparse_path)
-
-    def _sources(self, plan: StereoPlan) -> list[View]:
-        return [self.scene.views[index] for index in plan.sources]
-
-    def _depth_range(self, plan: StereoPlan) -> tuple[float, float]:
-        """That of the plan; a wide guess is narrowed by what small pictures show."""
-        near, far = plan.depth_range
-        if not plan.is_guess or far <= WIDE * near:
-            return near, far
-        if plan.index not in self._probed:
-            views = self._match_views(plan, SIDE_PX)
-            limits = probed_range(*views, plan.depth_range, self.config)
-            self._probed[plan.index] = limits
-        return self._probed[plan.index]
-
-    def _match_views(
-        self, plan: StereoPlan, max_image_size: int
-    ) -> tuple[MatchView, list[MatchView]]:
-        """The view and its sources at that size."""
-        reference, *sources = (
-            self._match_view(view, _camera_of_size(view, max_image_size))
-            for view in (self.scene.views[plan.index], *self._sources(plan))
-        )
-        return reference, sources
-
-    def _camera(self, view: View) -> Camera:
-        """The camera at matching size."""
-        return _camera_of_size(view, self.config.max_image_size)
-
-    def _match_view(self, view: View, camera: Camera) -> MatchView:
-        return MatchView(
-            gray=self.images.gray(view, camera),
-            K=index_K(camera),
-            cam_from_world=view.cam_from_world,
-        )
-
-    def _wanted(self, view: View, camera: Camera) -> Wanted:
-        """Where a depth is wanted: everywhere, or where the mask says so."""
-        size = (camera.width_px, camera.height_px)
-        if self.config.mask_path is not None:
-            path = mask_file(self.config.mask_path, view.name)
-            if path.is_file():
-                return read_mask(path, size)
-        return np.ones(size[::-1], np.bool_)
-
-
-def _camera_of_size(view: View, max_image_size: int) -> Camera:
-    """The camera of an image that is no larger than that; -1 = as it is."""
-    longest_px = max(view.camera.width_px, view.camera.height_px)
-    is_smaller = 0 < max_image_size < longest_px
-    return camera_at_scale(
-        view.camera, max_image_size / longest_px if is_smaller else 1.0
-    )
-
-
-def masked(found: Surface, wanted: Wanted) -> Surface:
-    """The same without depth and normals where none is wanted."""
-    return Surface(
-        depth=np.where(wanted, found.depth, np.float32(0)),
-        normals=np.where(wanted[..., np.newaxis], found.normals, np.float32(0)),
-    )
-
-
-def _nothing(camera: Camera) -> Surface:
-    """Maps without any depth."""
-    shape = (camera.height_px, camera.width_px)
-    return Surface(
-        depth=np.zeros(shape, np.float32),
-        normals=np.zeros((*shape, 3), np.float32),
-    )
+    def _options(self, kind: str) -> dict[str, Any]:
+        """Those that decide the maps of that kind."""
+        options = self.config.to_mapping()
+        idle = list(_DECIDE_NOTHING)
+        is_first_of_two = kind == PHOTOMETRIC and self.config.geom_consistency
+        if is_first_of_two or not self.config.filter:
+            idle += [name for name in options if name.startswith("filter")]
+            idle.append("write_consistency_graph")
+        if kind == PHOTOMETRIC:
+            idle += [name for name in options if name.startswith("geom_consistency")]
+        deciding = {name: options[name] for name in options if name not in idle}
+        return {"method": METHOD, **deciding}

@@ -41,7 +41,7 @@ class StereoPlan:
 
 
 def plan_stereo(
-    workspace: Workspace, scene: Scene, config: StereoConfig
+    workspace: Workspace, scene: Scene, config: StereoConfig, *, quiet: bool = False
 ) -> tuple[tuple[StereoPlan, ...], Skipped]:
     """Decide what each view is matched against, as patch-match.cfg says.
 
@@ -67,9 +67,10 @@ def plan_stereo(
             plans.append(_plan(scene, index, sources, config))
         except ValueError as error:
             skipped.append((name, str(error).removesuffix(".")))
-    for name, reason in skipped:
-        logger.warning("%s is skipped: %s.", name, reason)
-    _say_few_sources(scene, plans, config)
+    if not quiet:
+        for name, reason in skipped:
+            logger.warning("%s is skipped: %s.", name, reason)
+        _say_few_sources(scene, plans, config)
     return tuple(plans), tuple(skipped)
 
 

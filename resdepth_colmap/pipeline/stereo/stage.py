@@ -1,22 +1,31 @@
 """Stage "stereo": initial depth and normal maps for the views that have none."""
 
 import dataclasses
+import functools
 import logging
+from collections.abc import Sequence
 
 from resdepth_colmap.config import StereoBackend, StereoConfig
 from resdepth_colmap.errors import BackendUnavailableError, WorkspaceError
+from resdepth_colmap.io.colmap.consistency_graph import write_consistency_graph
+from resdepth_colmap.io.colmap.depth_map import write_depth_map
 from resdepth_colmap.io.colmap.masks import check_masks
+from resdepth_colmap.io.colmap.model import read_image_indices
+from resdepth_colmap.io.colmap.normal_map import write_normal_map
 from resdepth_colmap.io.colmap.workspace import Workspace
+from resdepth_colmap.pipeline.manifest import Manifest
 from resdepth_colmap.pipeline.stereo.colmap import run_colmap
-from resdepth_colmap.pipeline.stereo.ledger import Fingerprints, StereoLedger
+from resdepth_colmap.pipeline.stereo.load_view import MatchLoader
 from resdepth_colmap.pipeline.stereo.passes import (
-    StereoPass,
-    ViewMatcher,
-    passes_of,
+    MatchTask,
+    is_fresh,
+    match_tasks,
+    recorded_config,
 )
-from resdepth_colmap.pipeline.stereo.plan import StereoPlan, plan_stereo
+from resdepth_colmap.pipeline.stereo.plan import plan_stereo
+from resdepth_colmap.pipeline.stereo.view import Matched, match
 from resdepth_colmap.pipeline.stereo.warm_up import warm_up
-from resdepth_colmap.progress import Progress, SilentProgress
+from resdepth_colmap.progress import Advance, Progress, SilentProgress
 from resdepth_colmap.scene import Scene
 
 logger = logging.getLogger(__name__)
@@ -72,9 +81,25 @@ def choose_backend(
     if requested is not StereoBackend.AUTO:
         return requested
     if has_maps:
-        goes_on = StereoLedger(workspace).is_unfinished
-        return StereoBackend.CPU if goes_on else StereoBackend.EXISTING
+        _, is_done = _as_before(workspace, scene, StereoConfig())
+        return StereoBackend.EXISTING if is_done else StereoBackend.CPU
     return StereoBackend.COLMAP if has_cuda else StereoBackend.CPU
+
+
+def _as_before(
+    workspace: Workspace, scene: Scene, config: StereoConfig
+) -> tuple[StereoConfig, bool]:
+    """The options that maps of ours were made with, and whether all are fresh.
+
+    Where none is ours, the given options, and there is nothing to do.
+    """
+    manifest = Manifest(workspace.stereo_path)
+    recorded = recorded_config(manifest)
+    if recorded is None:
+        return config, True
+    plans, _ = plan_stereo(workspace, scene, recorded, quiet=True)
+    passes = match_tasks(workspace, scene, plans, recorded, manifest)
+    return recorded, not _pending(passes, manifest, overwrite=False)
 
 
 def stereo_workspace(
@@ -97,7 +122,9 @@ def stereo_workspace(
         WorkspaceError: If an image cannot be read, or nothing could be matched.
         BackendUnavailableError: See `choose_backend`.
     """
-    backend = choose_backend(backend, workspace, scene)
+    requested, backend = backend, choose_backend(backend, workspace, scene)
+    if requested is StereoBackend.AUTO and backend is StereoBackend.CPU:
+        config, _ = _as_before(workspace, scene, config)
     if backend is StereoBackend.EXISTING:
         names = [v.name for v in scene.views if workspace.map_kinds(v.name)]
         return StereoReport(backend=backend, kept=tuple(names))
@@ -123,27 +150,25 @@ def _run_cpu(
 ) -> StereoReport:
     _check_masks(scene, config)
     plans, skipped = plan_stereo(workspace, scene, config)
-    ledger = StereoLedger(workspace)
-    fingerprints = Fingerprints(scene, plans, config, ledger)
-    pending = _pending(plans, fingerprints, passes_of(config), overwrite)
+    manifest = Manifest(workspace.stereo_path)
+    passes = match_tasks(workspace, scene, plans, config, manifest)
+    pending = _pending(passes, manifest, overwrite)
     if pending:
         warm_up(config)
-    matcher = ViewMatcher(workspace, scene, config, ledger)
+    loop = _Loop(workspace, scene, config, manifest)
     matched: dict[str, None] = {}
     failed: dict[str, str] = {}
-    ledger.start()
-    num_units = sum(which.num_units for which, _ in pending)
+    num_units = sum(task.which.num_units for task in pending)
     with progress.stage("PatchMatch", num_units) as advance:
-        for which, plan in pending:
-            name = scene.views[plan.index].name
-            reason = matcher.match(plan, which, advance)
+        for task in pending:
+            name = scene.views[task.plan.index].name
+            reason = loop.do(task, advance)
             if reason:
                 logger.warning("%s is skipped: %s.", name, reason)
                 failed[name] = reason
                 continue
-            ledger.add(name, which.kind, fingerprints.of(plan, which.kind))
             matched[name] = None
-    ledger.finish()
+    manifest.save()
     names = [scene.views[plan.index].name for plan in plans]
     report = StereoReport(
         backend=StereoBackend.CPU,
@@ -155,23 +180,76 @@ def _run_cpu(
     return report
 
 
+class _Loop:
+    """Does tasks: load, match, store."""
+
+    def __init__(
+        self,
+        workspace: Workspace,
+        scene: Scene,
+        config: StereoConfig,
+        manifest: Manifest,
+    ) -> None:
+        self.workspace = workspace
+        self.scene = scene
+        self.config = config
+        self.manifest = manifest
+        self.loader = MatchLoader(workspace, scene, config)
+        self.probed: dict[int, tuple[float, float]] = {}
+
+    def do(self, task: MatchTask, advance: Advance) -> str:
+        """Match a view in a pass; returns why there is nothing to match, or ""."""
+        index, num_units = task.plan.index, task.which.num_units
+        data = self.loader.load(task, self.probed.get(index))
+        if data.why_nothing and data.wanted.any():
+            advance(num_units)
+            return data.why_nothing
+        found = match(
+            data,
+            self.config,
+            task.which.is_filtered,
+            lambda _, total: advance(num_units / total),
+        )
+        if not data.wanted.any():
+            advance(num_units)
+        else:
+            self.probed[index] = found.depth_range
+        self._store(task, found)
+        return ""
+
+    def _store(self, task: MatchTask, found: Matched) -> None:
+        """Write the maps, each whole or not at all."""
+        depth_path, normal_path, *graph_path = task.writes
+        self.manifest.start(task, {"options": self.config.to_mapping()})
+        if found.agrees is not None and graph_path:
+            sources = (self.scene.views[index] for index in task.plan.sources)
+            write_consistency_graph(
+                graph_path[0],
+                found.agrees & (found.surface.depth > 0),
+                [self._model_indices[view.image_id] for view in sources],
+            )
+        write_normal_map(normal_path, found.surface.normals)
+        write_depth_map(depth_path, found.surface.depth)
+        self.manifest.finish(task, {"options": self.config.to_mapping()})
+
+    @functools.cached_property
+    def _model_indices(self) -> dict[int, int]:
+        return read_image_indices(self.workspace.sparse_path)
+
+
 def _pending(
-    plans: tuple[StereoPlan, ...],
-    fingerprints: Fingerprints,
-    passes: tuple[StereoPass, ...],
-    overwrite: bool,
-) -> list[tuple[StereoPass, StereoPlan]]:
+    passes: Sequence[Sequence[MatchTask]], manifest: Manifest, overwrite: bool
+) -> list[MatchTask]:
     """What is to be done, in order: first passes only where a last one needs them."""
     *first, last = passes
-    ours = [p for p in plans if overwrite or not fingerprints.are_kept(p, last.kind)]
-    needed = {index for plan in ours for index in (plan.index, *plan.sources)}
+    ours = [task for task in last if overwrite or not is_fresh(task, manifest)]
+    needed = {i for task in ours for i in (task.plan.index, *task.plan.sources)}
     return [
-        (which, plan)
-        for which in first
-        for plan in plans
-        if plan.index in needed
-        and (overwrite or not fingerprints.are_kept(plan, which.kind))
-    ] + [(last, plan) for plan in ours]
+        task
+        for tasks in first
+        for task in tasks
+        if task.plan.index in needed and (overwrite or not is_fresh(task, manifest))
+    ] + ours
 
 
 def _check_masks(scene: Scene, config: StereoConfig) -> None:

@@ -5,19 +5,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fake_matcher import installed
 from planes import plane_views
 from workspaces import plane_folder
 
-from resdepth_colmap.config import StereoConfig
+from resdepth_colmap.config import StereoBackend, StereoConfig
 from resdepth_colmap.geometry.pixels import index_K
 from resdepth_colmap.io.colmap.model import read_scene
 from resdepth_colmap.io.colmap.workspace import open_workspace
 from resdepth_colmap.matching.patch_match import MatchView
-from resdepth_colmap.pipeline.stereo import passes as stereo_passes
+from resdepth_colmap.pipeline.stereo import load_view as stereo_load_view
+from resdepth_colmap.pipeline.stereo import view as stereo_view
 from resdepth_colmap.pipeline.stereo.depth_range_probe import probed_range
-from resdepth_colmap.pipeline.stereo.ledger import StereoLedger
-from resdepth_colmap.pipeline.stereo.passes import StereoPass, ViewMatcher
-from resdepth_colmap.pipeline.stereo.plan import plan_stereo
+from resdepth_colmap.pipeline.stereo.stage import stereo_workspace
 
 WIDE = (0.3, 300.0)
 PLANE = plane_views()
@@ -64,15 +64,16 @@ def test_only_a_guess_is_narrowed_and_but_once(
         sizes.append(reference.gray.shape)
         return 2.0, 8.0
 
-    monkeypatch.setattr(stereo_passes, "probed_range", probe)
-    monkeypatch.setattr(stereo_passes, "SIDE_PX", 40)
+    monkeypatch.setattr(stereo_view, "probed_range", probe)
+    monkeypatch.setattr(stereo_load_view, "PROBE_SIDE_PX", 40)
+    fake = installed(monkeypatch)
     folder = plane_folder(tmp_path, kinds=(), num_points=num_points)
     workspace = open_workspace(folder)
     scene = read_scene(workspace.sparse_path, workspace.images_path, workspace.path)
     config = StereoConfig(num_iterations=1, **options)  # type: ignore[arg-type] # floats
-    plans, _ = plan_stereo(workspace, scene, config)
-    matcher = ViewMatcher(workspace, scene, config, StereoLedger(workspace))
-    which = StereoPass(kind="photometric", is_filtered=False)
-    for _ in range(2):
-        matcher.match(plans[0], which, lambda _: None)
-    assert sizes == ([(30, 40)] if is_probed else [])
+    stereo_workspace(workspace, scene, config, StereoBackend.CPU)
+    num_views = len(scene.views)
+    assert sizes == ([(30, 40)] * num_views if is_probed else [])
+    assert len(fake.calls) == 2 * num_views
+    if is_probed:
+        assert all(call.depth_range == (2.0, 8.0) for call in fake.calls)

@@ -18,8 +18,8 @@ from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.io.colmap.depth_map import read_depth_map, write_depth_map
 from resdepth_colmap.io.colmap.model import read_scene
 from resdepth_colmap.io.colmap.workspace import Workspace, open_workspace
-from resdepth_colmap.pipeline.stereo import ledger as stereo_ledger
 from resdepth_colmap.pipeline.stereo import passes as stereo_passes
+from resdepth_colmap.pipeline.stereo import stage as stereo_stage
 from resdepth_colmap.pipeline.stereo.stage import (
     StereoReport,
     choose_backend,
@@ -168,7 +168,7 @@ def test_our_own_maps_are_made_anew_by_a_matcher_that_has_changed(
 ) -> None:
     folder = plane_folder(tmp_path, kinds=())
     match(folder)
-    monkeypatch.setattr(stereo_ledger, "METHOD", -1)
+    monkeypatch.setattr(stereo_passes, "METHOD", -1)
     assert set(match(folder).matched) == set(NAMES)
 
 
@@ -211,7 +211,7 @@ def test_an_interrupted_matching_goes_on_by_itself(
         write_depth_map(path, depth)
 
     with monkeypatch.context() as patch:
-        patch.setattr(stereo_passes, "write_depth_map", write)
+        patch.setattr(stereo_stage, "write_depth_map", write)
         with pytest.raises(KeyboardInterrupt):
             match(folder)
     assert choose_backend(StereoBackend.AUTO, *opened(folder)) is CPU
