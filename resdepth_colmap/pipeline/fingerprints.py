@@ -18,10 +18,12 @@ class MapFacts(NamedTuple):
     Attributes:
         digest: Of its size and its depths.
         filled: Share of its pixels that have a depth, in 0..1.
+        size_px: Width and height.
     """
 
     digest: str
     filled: float
+    size_px: tuple[int, int]
 
 
 class Fingerprints:
@@ -71,15 +73,16 @@ class Fingerprints:
             WorkspaceError: If it is no depth map.
         """
         facts = self._facts(path)
-        known = facts.get("map"), facts.get("filled")
-        if not (isinstance(known[0], str) and isinstance(known[1], float)):
+        if not _has_map_facts(facts):
             depth = read_depth_map(path)
             hasher = hashlib.sha256(repr(depth.shape).encode())
             hasher.update(np.ascontiguousarray(depth).data)
             facts["map"] = hasher.hexdigest()
             facts["filled"] = float(np.count_nonzero(depth) / depth.size)
+            facts["size_px"] = [depth.shape[1], depth.shape[0]]
             self._note(facts)
-        return MapFacts(facts["map"], facts["filled"])
+        width_px, height_px = facts["size_px"]
+        return MapFacts(facts["map"], facts["filled"], (width_px, height_px))
 
     def all(self) -> list[dict[str, Any]]:
         """What is known, fit for JSON; none of it is news any more."""
@@ -102,6 +105,16 @@ class Fingerprints:
 
     def _note(self, facts: dict[str, Any]) -> None:
         self._known[facts["file"]] = self._news[facts["file"]] = facts
+
+
+def _has_map_facts(facts: Mapping[str, Any]) -> bool:
+    size_px = facts.get("size_px")
+    return (
+        isinstance(facts.get("map"), str)
+        and isinstance(facts.get("filled"), float)
+        and isinstance(size_px, list)
+        and [type(value) for value in size_px] == [int, int]
+    )
 
 
 def _stamp(path: Path) -> list[int]:

@@ -71,9 +71,11 @@ def choose_initial_map(
     maps = []
     for kind in kinds:
         path = map_path(workspace, name, kind)
-        check_map_size(path, camera)
-        digest, filled = fingerprints.of_map(path)
-        maps.append(InitialMap(kind=kind, path=path, filled=filled, digest=digest))
+        found = fingerprints.of_map(path)
+        _check_size(path, found.size_px, camera)
+        maps.append(
+            InitialMap(kind=kind, path=path, filled=found.filled, digest=found.digest)
+        )
     return max(maps, key=lambda found: (found.filled, found.kind == PREFERRED))
 
 
@@ -83,7 +85,11 @@ def check_map_size(path: Path, camera: Camera) -> None:
     Raises:
         WorkspaceError: If it is larger than the image, or of another shape.
     """
-    width_px, height_px = read_map_size(path)
+    _check_size(path, read_map_size(path), camera)
+
+
+def _check_size(path: Path, size_px: tuple[int, int], camera: Camera) -> None:
+    width_px, height_px = size_px
     scale_x, scale_y = width_px / camera.width_px, height_px / camera.height_px
     # COLMAP rounds the size of a smaller map to whole pixels.
     rounding = 1.0 / camera.width_px + 1.0 / camera.height_px

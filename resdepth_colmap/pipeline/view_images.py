@@ -2,12 +2,13 @@
 
 import collections
 from collections.abc import Callable, Hashable
+from pathlib import Path
 
 import cv2
 import numpy as np
 
 from resdepth_colmap.io.colmap.depth_map import read_depth_map
-from resdepth_colmap.io.colmap.workspace import Workspace
+from resdepth_colmap.io.colmap.workspace import Workspace, original_map_path
 from resdepth_colmap.io.images import read_gray, read_unit_colors
 from resdepth_colmap.scene import (
     Camera,
@@ -105,6 +106,15 @@ class ViewImages:
         size = (camera.width_px, camera.height_px)
         key = (view.name, size, kind)
         return self.cache.get(key, lambda: self._load_depth(view, size, kind))
+
+    def whole_map(self, path: Path) -> DepthMap:
+        """The depth map of a file, as it was before any run in place; 0 = no depth.
+
+        Raises:
+            WorkspaceError: If the map cannot be read.
+        """
+        original = original_map_path(path) or path  # replaced since it was planned?
+        return self.cache.get(original, lambda: read_depth_map(original))
 
     def _load_gray(self, view: View, size: Size) -> GrayImage:
         gray = read_gray(self.workspace.image_path(view.name))

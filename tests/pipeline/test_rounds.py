@@ -159,3 +159,15 @@ def test_other_rounds_mean_again(tmp_path: Path) -> None:
     refine(folder, 1, weights)
     assert set(refine(folder, 2, weights).refined) == set(NAMES)
     assert set(refine(folder, 1, weights).refined) == set(NAMES)
+
+
+@pytest.mark.parametrize("rounds", [1, 2])
+def test_in_place_gives_what_a_run_beside_gives(tmp_path: Path, rounds: int) -> None:
+    folder, weights = noisy_folder(tmp_path), moving_weights(tmp_path)
+    refine(folder, rounds, weights)
+    config = dataclasses.replace(CONFIG, outer_iterations=rounds, weights=weights)
+    other = noisy_folder(tmp_path / "other")
+    refine_workspace(open_workspace(other), config, in_place=True)
+    for name, depth in refined_maps(folder).items():
+        path = other / "stereo" / "depth_maps" / f"{name}.geometric.bin"
+        np.testing.assert_array_equal(read_depth_map(path), depth)

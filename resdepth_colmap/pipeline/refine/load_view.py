@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 
 from resdepth_colmap.geometry.pixels import index_K
-from resdepth_colmap.io.colmap.depth_map import read_depth_map
 from resdepth_colmap.pipeline.refine.cross_view import SourceMap
 from resdepth_colmap.pipeline.refine.plan import ViewTask
 from resdepth_colmap.pipeline.refine.view import SourceView, ViewInputs
@@ -17,7 +16,7 @@ def load_view(task: ViewTask, scene: Scene, images: ViewImages) -> ViewInputs:
     Args:
         task: The view, its sources and its maps.
         scene: The views.
-        images: Loads the images.
+        images: Loads images and maps.
 
     Raises:
         WorkspaceError: If an image or a map is missing or cannot be read.
@@ -26,9 +25,9 @@ def load_view(task: ViewTask, scene: Scene, images: ViewImages) -> ViewInputs:
         scene,
         task.index,
         [choice.index for choice in task.sources],
-        read_depth_map(task.initial.path),
+        images.whole_map(task.initial.path),
         images,
-        {index: read_depth_map(path) for index, path in task.source_maps},
+        {index: images.whole_map(path) for index, path in task.source_maps},
     )
 
 
