@@ -8,7 +8,7 @@ from resdepth_colmap.evaluation.metrics.reference_free import Sums
 from resdepth_colmap.evaluation.metrics.tile_sums import TileSums
 from resdepth_colmap.geometry.inverse_depth import invert_map
 from resdepth_colmap.geometry.warp import warp_to_reference
-from resdepth_colmap.pipeline.refine.photometric_error import photo_consistency
+from resdepth_colmap.pipeline.refine.photometric_error import photometric_error
 from resdepth_colmap.pipeline.refine.view import SourceView, ViewInputs
 
 Sampled = tuple[Tensor, Tensor]
@@ -46,7 +46,7 @@ def photo_agreement(maps: ViewMaps, photos: ViewInputs) -> dict[str, Sums]:
 
 def _correlation(reference: Tensor, image: Tensor, counted: Tensor) -> Tensor:
     """Correlation at the counted pixels, 0 elsewhere, shape (H, W)."""
-    value = photo_consistency(reference, [(image, counted)])
+    value = photometric_error(reference, [(image, counted)])
     return torch.where(counted, 1.0 - 2.0 * value, 0.0)[0, 0]
 
 

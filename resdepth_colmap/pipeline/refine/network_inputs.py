@@ -24,7 +24,7 @@ from resdepth_colmap.network.network_config import (
     Normalisation,
 )
 from resdepth_colmap.network.unet import INPUT_LIMIT, SampleSource
-from resdepth_colmap.pipeline.refine.photometric_error import photo_consistency
+from resdepth_colmap.pipeline.refine.photometric_error import photometric_error
 from resdepth_colmap.pipeline.refine.source_sampler import (
     Sight,
     SourceSampler,
@@ -137,23 +137,23 @@ def initial_maps(depth: DepthMap) -> tuple[FloatMap, NDArray[np.bool_]]:
 
 
 class Seen(NamedTuple):
-    """What the second views show where a view's depth projects into them.
+    """The sources, warped into the reference by a view's depth.
 
     Attributes:
         warped: Of each source the image and where it is inside, in the reference
             camera, shapes (B, 1, H, W).
-        consistency: How badly the best of them matches the reference, likewise
-            (`photo_consistency`).
+        error: Photometric error of the best of them, likewise; 0 = the same pattern
+            (`photometric_error`).
     """
 
     warped: tuple[tuple[Tensor, Tensor], ...]
-    consistency: Tensor
+    error: Tensor
 
 
 def seen_by_sources(view: ViewTensors, num_sources: int) -> Seen:
     """Look through so many sources, or as many as there are."""
     warped = warp_sources(view, num_sources)
-    return Seen(tuple(warped), photo_consistency(view.gray, warped))
+    return Seen(tuple(warped), photometric_error(view.gray, warped))
 
 
 def build_inputs(
@@ -175,7 +175,7 @@ def build_inputs(
     channels |= _color_channels(view)
     if config.uses_sources:
         seen = seen or seen_by_sources(view, config.num_sources)
-        channels["photo_consistency"] = seen.consistency
+        channels["photo_consistency"] = seen.error
         for index in range(config.num_sources):
             is_there = index < len(seen.warped)
             image = seen.warped[index][0] if is_there else torch.zeros_like(view.gray)

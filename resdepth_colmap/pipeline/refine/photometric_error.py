@@ -8,10 +8,10 @@ from torch.nn.functional import avg_pool2d
 
 NCC_WINDOW_PX = 7
 NCC_VARIANCE_FLOOR = 4e-6  # (half a grey level of 255) squared: weaker is noise
-NO_EVIDENCE = 0.5  # photo-consistency of a correlation of 0
+NO_EVIDENCE = 0.5  # photometric error of a correlation of 0
 
 
-def photo_consistency(reference: Tensor, warped: list[tuple[Tensor, Tensor]]) -> Tensor:
+def photometric_error(reference: Tensor, warped: list[tuple[Tensor, Tensor]]) -> Tensor:
     """How badly the best warped source matches the reference, in 0..1.
 
     (1 - NCC) / 2, with the zero-mean normalised cross-correlation of 7 x 7 windows: 0 =

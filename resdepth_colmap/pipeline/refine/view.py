@@ -146,7 +146,7 @@ def refine_view(
         initial = tensors.inverse_depth
         num_sources = network.config.num_sources
         seen = seen_by_sources(tensors, num_sources)
-        gate = UpdateGate(tensors, num_sources, seen.consistency)
+        gate = UpdateGate(tensors, num_sources, seen.error)
         for number in range(config.inner_iterations):
             if number > 0:
                 seen = seen_by_sources(tensors, num_sources)
@@ -155,8 +155,8 @@ def refine_view(
             refined = (tensors.inverse_depth + outputs[:, :1]).clamp(low, high)
             error = outputs[:, 1:2] if network.config.confidence else None
             if config.update_gating:
-                is_kept = gate.is_kept(refined, error)
-                refined = torch.where(is_kept, initial, refined)
+                is_rejected = gate.rejects(refined, error)
+                refined = torch.where(is_rejected, initial, refined)
             tensors = tensors._replace(inverse_depth=refined)
         if error is not None:
             confidence = 1.0 - torch.exp(-CONFIDENT_ERROR * refined / error)
@@ -269,7 +269,7 @@ def _map(values: NDArray[Any] | None, device: torch.device) -> Tensor | None:
 
 
 def _correlation(tensors: ViewTensors, num_sources: int) -> Tensor:
-    badness = seen_by_sources(tensors, num_sources).consistency
+    badness = seen_by_sources(tensors, num_sources).error
     return (1.0 - 2.0 * badness).clamp(min=0.0)
 
 

@@ -9,12 +9,20 @@ from analytic_scene import PLANE_NORMAL, PLANE_OFFSET, depth_of_plane, two_views
 from refined_plane import TILES, expect_error, network, view
 
 from resdepth_colmap.geometry.pixels import index_K
-from resdepth_colmap.pipeline.refine.acceptance import UpdateGate
+from resdepth_colmap.pipeline.refine.acceptance import SUPPORTED_ERROR, UpdateGate
 from resdepth_colmap.pipeline.refine.cross_view import SourceMap, start_from
 from resdepth_colmap.pipeline.refine.network_inputs import ViewTensors, seen_by_sources
 from resdepth_colmap.pipeline.refine.source_sampler import SourceTensors
 from resdepth_colmap.pipeline.refine.view import ViewInputs, refine_view
 from resdepth_colmap.scene import DepthMap, cam_from_cam
+
+
+def test_the_photometric_error_is_small_where_the_photographs_agree() -> None:
+    right = facing_wall()
+    wrong = right._replace(inverse_depth=1.3 * right.inverse_depth)
+    middle = (..., slice(4, -4), slice(4, -DISPARITY_PX - 8))
+    assert seen_by_sources(right, 1).error[middle].max() < SUPPORTED_ERROR
+    assert seen_by_sources(wrong, 1).error[middle].median() > SUPPORTED_ERROR
 
 
 def with_and_without_rule(initial: ViewInputs) -> tuple[DepthMap, DepthMap]:
@@ -53,11 +61,11 @@ def facing_wall(texture: float = 1.0, num_consistent: int | None = None) -> View
 
 def kept_share(view: ViewTensors, change: float, num_errors: float = 1e6) -> float:
     """Where the source sees it, of a relative change of so many expected errors."""
-    kept = UpdateGate(view, 1, seen_by_sources(view, 1).consistency)
+    gate = UpdateGate(view, 1, seen_by_sources(view, 1).error)
     error = torch.full_like(view.inverse_depth, abs(change) / num_errors)
     refined = view.inverse_depth * (1.0 + change)
-    is_kept = kept.is_kept(refined, error * view.inverse_depth)
-    return float(is_kept[..., 4 : -DISPARITY_PX - 8].float().mean())
+    is_rejected = gate.rejects(refined, error * view.inverse_depth)
+    return float(is_rejected[..., 4 : -DISPARITY_PX - 8].float().mean())
 
 
 def test_a_small_change_that_the_photographs_contradict_is_not_taken() -> None:

@@ -28,7 +28,7 @@ from resdepth_colmap.pipeline.refine.network_inputs import (
     tile_scaling,
     warp_sources,
 )
-from resdepth_colmap.pipeline.refine.photometric_error import photo_consistency
+from resdepth_colmap.pipeline.refine.photometric_error import photometric_error
 from resdepth_colmap.pipeline.refine.source_sampler import SourceTensors
 
 
@@ -169,9 +169,9 @@ def test_a_batch_is_normalised_view_by_view() -> None:
 
 def test_photo_consistency_is_near_zero_at_the_true_depth_and_larger_off_it() -> None:
     view = view_of(plane_pair())
-    right = photo_consistency(view.gray, warp_sources(view, 1))
+    right = photometric_error(view.gray, warp_sources(view, 1))
     off = view._replace(inverse_depth=view.inverse_depth * 1.4)
-    wrong = photo_consistency(view.gray, warp_sources(off, 1))
+    wrong = photometric_error(view.gray, warp_sources(off, 1))
     inside = warp_sources(view, 1)[0][1] & warp_sources(off, 1)[0][1]
     assert right[inside].median() < 0.01
     assert wrong[inside].median() > 10 * right[inside].median()
@@ -181,7 +181,7 @@ def test_photo_consistency_does_not_see_the_exposure() -> None:
     view = view_of(plane_pair())
     warped = warp_sources(view, 1)
     darker = [(0.4 * image + 0.2, inside) for image, inside in warped]
-    change = photo_consistency(view.gray, darker) - photo_consistency(view.gray, warped)
+    change = photometric_error(view.gray, darker) - photometric_error(view.gray, warped)
     # Windows of hardly any texture are damped, and more so when darker.
     assert change.abs().median() < 5e-3
     assert change.abs().max() < 0.05
@@ -190,9 +190,9 @@ def test_photo_consistency_does_not_see_the_exposure() -> None:
 def test_without_texture_or_source_there_is_no_evidence() -> None:
     flat = torch.full((1, 1, 12, 12), 0.3)
     everywhere = torch.ones_like(flat, dtype=torch.bool)
-    plain = photo_consistency(flat, [(flat, everywhere)])
+    plain = photometric_error(flat, [(flat, everywhere)])
     assert (plain - 0.5).abs().max() < 0.02  # single precision's rounding
-    nowhere = photo_consistency(flat, [(flat, ~everywhere)])
+    nowhere = photometric_error(flat, [(flat, ~everywhere)])
     assert (nowhere == 0.5).all()
 
 

@@ -12,7 +12,7 @@ from noisy_planes import write_noisy_plane
 
 from resdepth_colmap.errors import TrainingError
 from resdepth_colmap.network.network_config import InputVariant, NetworkConfig
-from resdepth_colmap.pipeline.refine.photometric_error import photo_consistency
+from resdepth_colmap.pipeline.refine.photometric_error import photometric_error
 from resdepth_colmap.training.data import crops
 from resdepth_colmap.training.data.crops import CropSampler
 from resdepth_colmap.training.data.samples import prepare_samples, read_sample
@@ -58,11 +58,11 @@ def test_a_mirrored_crop_is_that_of_a_mirrored_pair(samples: tuple[Path, ...]) -
         for name in ("reference", "source_0", "photo_consistency")
     )
     inside = source > 0  # outside it is exactly black
-    again = photo_consistency(reference, [(source, inside)])
+    again = photometric_error(reference, [(source, inside)])
     middle = (..., slice(4, -4), slice(4, -4))  # windows that the crop does not cut
     error = (again - stored)[middle].abs()
     assert float(error.quantile(0.95)) < 0.02
-    mirrored = photo_consistency(reference, [(source.flip(-1), inside.flip(-1))])
+    mirrored = photometric_error(reference, [(source.flip(-1), inside.flip(-1))])
     assert float((mirrored - stored)[middle].abs().mean()) > 0.1
 
 
@@ -172,8 +172,8 @@ def test_the_source_that_is_looked_at_again_fits_the_crop(
     there = batch.sample_source(batch.target)
     inside = there > 0
     middle = (..., slice(4, -4), slice(4, -4))
-    badness = photo_consistency(reference, [(there, inside)])[middle]
-    mirrored = photo_consistency(reference, [(there.flip(-1), inside.flip(-1))])
+    badness = photometric_error(reference, [(there, inside)])[middle]
+    mirrored = photometric_error(reference, [(there.flip(-1), inside.flip(-1))])
     assert float(badness.median()) < 0.1
     assert float(mirrored[middle].median()) > 0.3
 
