@@ -102,7 +102,11 @@ def _show_plan(found: "Inspection") -> None:
     }
     cost = found.estimate
     show_line("refine would", f"take depth from {origin[str(found.stereo_backend)]},")
+    if found.maps and found.num_matched:
+        show_line("", f"match {found.num_matched} of {found.num_views} images")
     show_line("", f"refine {found.num_refined} of {found.num_views} images")
+    if found.num_fresh:
+        show_line("", f"keep {found.num_fresh}, whose refined maps are up to date")
     if cost.stereo_s:
         show_line("PatchMatch", f"about {duration(cost.stereo_s)}")
     show_line("refinement", f"about {duration(cost.refine_s)}")

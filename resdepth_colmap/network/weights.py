@@ -105,6 +105,16 @@ def load_weights(
     return network.to(device).eval()
 
 
+def read_config(path: Path | None = None) -> NetworkConfig:
+    """The network that a weights file is of, from its header alone.
+
+    Raises:
+        WeightsError: If the file is missing, broken, not ours or of an unknown network.
+    """
+    path = default_weights_path() if path is None else path
+    return _config(path, _header(path))
+
+
 def read_facts(path: Path | None = None) -> dict[str, Any]:
     """What `save_weights` was told about the training.
 
@@ -136,11 +146,7 @@ def _stored(value: Tensor) -> Tensor:
 
 
 def _read(path: Path) -> tuple[NetworkConfig, dict[str, Tensor]]:
-    header = _header(path)
-    try:
-        config = _network_config(header["network"])
-    except (ConfigError, TypeError) as error:
-        raise WeightsError(f"{path}: unknown kind of network ({error})") from error
+    config = _config(path, _header(path))
     try:
         with safe_open(path, framework="pt") as file:
             tensors = {name: _loaded(file.get_tensor(name)) for name in file.keys()}  # noqa: SIM118 (no mapping)
@@ -152,9 +158,13 @@ def _read(path: Path) -> tuple[NetworkConfig, dict[str, Tensor]]:
     return config, tensors
 
 
-def _network_config(options: Mapping[str, Any]) -> NetworkConfig:
-    named = {_RENAMED.get(name, name): value for name, value in options.items()}
-    return NetworkConfig.from_mapping({**_OLDER, **named})
+def _config(path: Path, header: Mapping[str, Any]) -> NetworkConfig:
+    options = header["network"].items()
+    named = {_RENAMED.get(name, name): value for name, value in options}
+    try:
+        return NetworkConfig.from_mapping({**_OLDER, **named})
+    except (ConfigError, TypeError) as error:
+        raise WeightsError(f"{path}: unknown kind of network ({error})") from error
 
 
 def _loaded(value: Tensor) -> Tensor:

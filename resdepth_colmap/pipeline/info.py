@@ -10,15 +10,20 @@ import numpy as np
 from resdepth_colmap.config import RefineConfig, StereoBackend, StereoConfig
 from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.io.colmap.depth_map import read_depth_map, read_map_size
+from resdepth_colmap.io.colmap.output import OutputWorkspace
 from resdepth_colmap.io.colmap.workspace import Workspace, missing_images
 from resdepth_colmap.pipeline.initial_map import (
     candidate_kinds,
     check_map_size,
     map_path,
 )
+from resdepth_colmap.pipeline.manifest import Manifest
+from resdepth_colmap.pipeline.refine.plan import STAGE as REFINE_STAGE
+from resdepth_colmap.pipeline.refine.plan import plan_refine
 from resdepth_colmap.pipeline.run_config import UNFILTERED
 from resdepth_colmap.pipeline.stereo.passes import passes_of
 from resdepth_colmap.pipeline.stereo.stage import choose_backend
+from resdepth_colmap.pipeline.stereo.work import plan_auto
 from resdepth_colmap.scene import Scene, View
 
 MOST_MAPS_READ = 8  # of each kind, spread over the views: info is to be quick
@@ -80,7 +85,9 @@ class Inspection:
         missing_images: Images of the model without a file.
         cfg_files: COLMAP's cfg files that are there.
         stereo_backend: Where initial depth would come from.
+        num_matched: Images that PatchMatch would match first.
         num_refined: Images that `refine` would refine.
+        num_fresh: Images whose refined maps are there and would be kept.
         estimate: Time and memory to expect.
         warnings: What may surprise.
     """
@@ -94,7 +101,9 @@ class Inspection:
     missing_images: tuple[str, ...]
     cfg_files: tuple[str, ...]
     stereo_backend: StereoBackend
+    num_matched: int
     num_refined: int
+    num_fresh: int
     estimate: Estimate
     warnings: tuple[str, ...]
 
@@ -121,7 +130,10 @@ def inspect_workspace(
     maps, broken = _summaries(workspace, scene)
     backend = choose_backend(StereoBackend.AUTO, workspace, scene)
     missing = missing_images(workspace, scene)
-    refined = _refined_views(workspace, scene, backend, refine.input)
+    matched = _matched_views(workspace, scene, backend)
+    fresh = () if matched or broken else _fresh_names(workspace, scene, refine)
+    usable = _usable_views(workspace, scene, matched, refine.input)
+    refined = [view for view in usable if view.name not in fresh]
     sizes = collections.Counter(
         (view.camera.width_px, view.camera.height_px) for view in scene.views
     )
@@ -135,19 +147,54 @@ def inspect_workspace(
         missing_images=missing,
         cfg_files=tuple(n for n in CFG_NAMES if (workspace.stereo_path / n).is_file()),
         stereo_backend=backend,
+        num_matched=len(matched),
         num_refined=len(refined),
-        estimate=_estimate(workspace, refined, backend, refine, stereo),
+        num_fresh=len(fresh),
+        estimate=_estimate(workspace, (matched, refined), backend, refine, stereo),
         warnings=broken,
     )
     return dataclasses.replace(found, warnings=(*broken, *_warnings(found)))
 
 
-def _refined_views(
-    workspace: Workspace, scene: Scene, backend: StereoBackend, requested: str
+def _matched_views(
+    workspace: Workspace, scene: Scene, backend: StereoBackend
 ) -> list[View]:
-    if backend is not StereoBackend.EXISTING:
+    """The views that PatchMatch would match."""
+    if backend is StereoBackend.EXISTING:
+        return []
+    if backend is StereoBackend.COLMAP:
         return list(scene.views)
-    return [v for v in scene.views if candidate_kinds(workspace, v.name, requested)]
+    pending = plan_auto(workspace, scene, UNFILTERED).pending
+    indices = sorted({task.plan.index for task in pending})
+    return [scene.views[index] for index in indices]
+
+
+def _usable_views(
+    workspace: Workspace, scene: Scene, matched: list[View], requested: str
+) -> list[View]:
+    """The views that would have a map to start from."""
+    names = {view.name for view in matched}
+    return [
+        view
+        for view in scene.views
+        if view.name in names or candidate_kinds(workspace, view.name, requested)
+    ]
+
+
+def _fresh_names(
+    workspace: Workspace, scene: Scene, config: RefineConfig
+) -> tuple[str, ...]:
+    """The images whose refined maps would be kept, by the plan of the stage itself."""
+    output = OutputWorkspace(source=workspace)
+    manifest = Manifest(output.path)
+    if not manifest.has_any(REFINE_STAGE):
+        return ()
+    from resdepth_colmap.network.weights import read_config, weights_hash  # torch
+
+    network = read_config(config.weights), weights_hash(config.weights)
+    plan = plan_refine(output, scene, config, network, manifest)
+    *_, results = plan.iterations
+    return tuple(task.name for task in results if manifest.is_fresh(task))
 
 
 def _summaries(
@@ -190,16 +237,19 @@ def _filled_shares(
 
 def _estimate(
     workspace: Workspace,
-    views: list[View],
+    views: tuple[list[View], list[View]],
     backend: StereoBackend,
     refine: RefineConfig,
     stereo: StereoConfig,
 ) -> Estimate:
-    sizes = [_megapixels(workspace, view, stereo.max_image_size) for view in views]
-    total, largest = sum(sizes), max(sizes, default=0.0)
+    to_match, to_refine = (
+        [_megapixels(workspace, view, stereo.max_image_size) for view in some]
+        for some in views
+    )
+    total, largest = sum(to_refine), max(to_refine, default=0.0)
     slowness = MEASURED_CORES / max(1, os.cpu_count() or 1)
     matched = backend is StereoBackend.CPU
-    pass_s = STEREO_S_PER_MEGAPIXEL_AND_PASS * total * slowness
+    pass_s = STEREO_S_PER_MEGAPIXEL_AND_PASS * sum(to_match) * slowness
     stereo_s = pass_s * len(passes_of(stereo)) if matched else 0.0
     num_passes = refine.inner_iterations * refine.outer_iterations
     return Estimate(
@@ -241,8 +291,13 @@ def _warnings(found: Inspection) -> list[str]:
             "no sparse points: views are paired and depth ranges are guessed by pose, "
             "and COLMAP's own fusion gives no point (--fuser open3d does)"
         )
-    if found.maps and 0 < found.num_refined < found.num_views:
-        without = found.num_views - found.num_refined
+    if found.maps and found.num_matched:
+        warnings.append(
+            f"{found.num_matched} images have no depth map, or one that was made from "
+            "other poses, images or sources: PatchMatch would make them"
+        )
+    without = found.num_views - found.num_refined - found.num_fresh
+    if found.maps and without > 0:
         warnings.append(f"{without} images have no depth map and would be skipped")
     for kind, summary in found.maps.items():
         if summary.num_normal_maps < summary.num_maps:

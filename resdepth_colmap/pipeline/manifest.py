@@ -111,6 +111,10 @@ class Manifest:
         """Whether the stage has made anything here, or began to."""
         return any(entry_stage == stage for entry_stage, _ in self._entries)
 
+    def has(self, stage: str, name: str) -> bool:
+        """Whether the stage has made, or begun, a result of that name."""
+        return (stage, name) in self._entries
+
     def facts_of(self, stage: str) -> list[dict[str, Any]]:
         """What was noted of each result of a stage, the latest last."""
         entries = self._entries.items()

@@ -6,13 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from planes import NAMES
-from workspaces import plane_folder
+from workspaces import identity_weights, plane_folder
 
 from resdepth_colmap.config import RefineConfig, StereoBackend
 from resdepth_colmap.io.colmap.depth_map import read_depth_map, write_depth_map
 from resdepth_colmap.io.colmap.model import read_scene
 from resdepth_colmap.io.colmap.workspace import open_workspace
 from resdepth_colmap.pipeline.info import Inspection, inspect_workspace
+from resdepth_colmap.pipeline.refine.stage import refine_workspace
 
 
 def inspect(folder: Path, config: RefineConfig | None = None) -> Inspection:
@@ -60,9 +61,23 @@ def test_what_may_surprise_is_a_warning(tmp_path: Path) -> None:
     text = "\n".join(inspect(folder).warnings)
     assert f"without a file: {NAMES[3]}" in text
     assert "no sparse points" in text
-    assert "1 images have no depth map" in text
+    assert "1 images have no depth map, or one that was made from" in text
     assert "have no normal map" in text
     assert "0.png.geometric.bin: not a COLMAP map" in text
+
+
+def test_what_is_up_to_date_costs_nothing(tmp_path: Path) -> None:
+    folder = plane_folder(tmp_path)
+    options = RefineConfig(weights=identity_weights(tmp_path))
+    assert inspect(folder, options).num_refined == len(NAMES)
+    refine_workspace(open_workspace(folder), options)
+    found = inspect(folder, options)
+    assert (found.num_refined, found.num_fresh) == (0, len(NAMES))
+    assert found.estimate.refine_s == 0
+    path = folder / "stereo/depth_maps" / f"{NAMES[0]}.geometric.bin"
+    write_depth_map(path, np.float32(1.01) * read_depth_map(path))
+    found = inspect(folder, options)
+    assert (found.num_refined, found.num_fresh) == (1, len(NAMES) - 1)
 
 
 def test_passes_cost_in_proportion(tmp_path: Path) -> None:

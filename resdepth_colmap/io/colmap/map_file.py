@@ -32,6 +32,8 @@ def read_planes(path: Path, num_channels: int) -> npt.NDArray[np.float32]:
             shape, num_header_bytes = _checked(path, header, num_present, num_channels)
             file.seek(num_header_bytes)
             values = np.fromfile(file, dtype="<f4")
+    except WorkspaceError:
+        raise
     except OSError as error:
         raise _unreadable(path, error) from error
     return values.reshape(shape).astype(np.float32, copy=False)

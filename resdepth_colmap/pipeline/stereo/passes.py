@@ -71,6 +71,11 @@ def passes_of(config: StereoConfig) -> tuple[StereoPass, ...]:
     )
 
 
+def map_name(name: str, kind: str) -> str:
+    """What the maps of an image are called in the manifest."""
+    return f"{name}.{kind}"
+
+
 def match_tasks(
     workspace: Workspace,
     scene: Scene,
@@ -103,7 +108,7 @@ def match_tasks(
             tasks[-1].append(
                 MatchTask(
                     stage=STAGE,
-                    name=f"{name}.{which.kind}",
+                    name=map_name(name, which.kind),
                     key=key,
                     writes=writes,
                     plan=plan,
@@ -131,8 +136,11 @@ def is_fresh(task: MatchTask, manifest: Manifest) -> bool:
 
 
 def is_replaceable(task: MatchTask, manifest: Manifest) -> bool:
-    """Whether its depth map is of this program, or not there."""
-    return not task.writes[0].exists() or manifest.is_ours(task)
+    """Whether its depth map is of this program, not there, or blank."""
+    path = task.writes[0]
+    if not path.exists() or manifest.is_ours(task):
+        return True
+    return not manifest.fingerprints.of_map(path).filled
 
 
 class _Keys:

@@ -2,6 +2,7 @@
 
 import dataclasses
 import logging
+from collections.abc import Sequence
 
 from resdepth_colmap.config import StereoConfig
 from resdepth_colmap.geometry.depth_range import depth_range
@@ -32,27 +33,43 @@ class StereoPlan:
         sources: Places of its sources, at least one.
         depth_range: Near and far depth, in workspace units, 0 < near < far.
         is_guess: Whether nothing but the poses tells the depth range.
+        unknown_sources: What patch-match.cfg names as sources and the model lacks.
     """
 
     index: int
     sources: tuple[int, ...]
     depth_range: tuple[float, float]
     is_guess: bool = False
+    unknown_sources: tuple[str, ...] = ()
 
 
 def plan_stereo(
-    workspace: Workspace, scene: Scene, config: StereoConfig, *, quiet: bool = False
+    workspace: Workspace,
+    scene: Scene,
+    config: StereoConfig,
+    *,
+    all_views: bool = False,
 ) -> tuple[tuple[StereoPlan, ...], Skipped]:
     """Decide what each view is matched against, as patch-match.cfg says.
 
-    Without that file every view is matched against automatically chosen ones. Views
-    that cannot be matched are said and left out.
+    Without that file every view is matched against automatically chosen ones.
+
+    Args:
+        workspace: Where that file lies.
+        scene: The views.
+        config: Options.
+        all_views: Match views that the file does not name, too.
+
+    Returns:
+        The plans, and the views that cannot be matched, each with the reason.
 
     Raises:
         WorkspaceError: If patch-match.cfg is malformed.
     """
     path = workspace.stereo_path / "patch-match.cfg"
     specs = read_sources(path) if path.exists() else _automatic(scene)
+    if all_views:
+        specs = {**_automatic(scene), **specs}
     plans, skipped = [], []
     for name, spec in specs.items():
         index = scene.index(name)
@@ -64,13 +81,11 @@ def plan_stereo(
             skipped.append((name, "no other view overlaps with it"))
             continue
         try:
-            plans.append(_plan(scene, index, sources, config))
+            plan = _plan(scene, index, sources, config)
+            unknown = tuple(n for n in dict.fromkeys(spec.names) if scene.index(n) < 0)
+            plans.append(dataclasses.replace(plan, unknown_sources=unknown))
         except ValueError as error:
             skipped.append((name, str(error).removesuffix(".")))
-    if not quiet:
-        for name, reason in skipped:
-            logger.warning("%s is skipped: %s.", name, reason)
-        _say_few_sources(scene, plans, config)
     return tuple(plans), tuple(skipped)
 
 
@@ -119,15 +134,8 @@ def _places(choices: tuple[SourceChoice, ...]) -> tuple[int, ...]:
 
 
 def _listed(scene: Scene, index: int, names: tuple[str, ...]) -> tuple[int, ...]:
-    indices = {name: scene.index(name) for name in dict.fromkeys(names)}
-    for name, other in indices.items():
-        if other < 0:
-            logger.warning(
-                "%s: its source %s is left out: the model does not have it.",
-                scene.views[index].name,
-                name,
-            )
-    return tuple(other for other in indices.values() if other not in (-1, index))
+    indices = [scene.index(name) for name in dict.fromkeys(names)]
+    return tuple(other for other in indices if other not in (-1, index))
 
 
 def _plan(
@@ -143,9 +151,15 @@ def _plan(
     )
 
 
-def _say_few_sources(
-    scene: Scene, plans: list[StereoPlan], config: StereoConfig
-) -> None:
+def say_plan(scene: Scene, plans: Sequence[StereoPlan], config: StereoConfig) -> None:
+    """Warn of sources that are not there, and of views with too few of them."""
+    for plan in plans:
+        for name in plan.unknown_sources:
+            logger.warning(
+                "%s: its source %s is left out: the model does not have it.",
+                scene.views[plan.index].name,
+                name,
+            )
     needed = config.filter_min_num_consistent
     few = [scene.views[p.index].name for p in plans if len(p.sources) < needed]
     if config.filter and few:

@@ -3,7 +3,6 @@
 import dataclasses
 import functools
 import logging
-from collections.abc import Sequence
 
 from resdepth_colmap.config import StereoBackend, StereoConfig
 from resdepth_colmap.errors import BackendUnavailableError, WorkspaceError
@@ -16,15 +15,11 @@ from resdepth_colmap.io.colmap.workspace import Workspace
 from resdepth_colmap.pipeline.manifest import Manifest
 from resdepth_colmap.pipeline.stereo.colmap import run_colmap
 from resdepth_colmap.pipeline.stereo.load_view import MatchLoader
-from resdepth_colmap.pipeline.stereo.passes import (
-    MatchTask,
-    is_fresh,
-    match_tasks,
-    recorded_config,
-)
-from resdepth_colmap.pipeline.stereo.plan import plan_stereo
+from resdepth_colmap.pipeline.stereo.passes import MatchTask
+from resdepth_colmap.pipeline.stereo.plan import say_plan
 from resdepth_colmap.pipeline.stereo.view import Matched, match
 from resdepth_colmap.pipeline.stereo.warm_up import warm_up
+from resdepth_colmap.pipeline.stereo.work import StereoWork, plan_auto, plan_work
 from resdepth_colmap.progress import Advance, Progress, SilentProgress
 from resdepth_colmap.scene import Scene
 
@@ -81,25 +76,9 @@ def choose_backend(
     if requested is not StereoBackend.AUTO:
         return requested
     if has_maps:
-        _, is_done = _as_before(workspace, scene, StereoConfig())
+        is_done = not plan_auto(workspace, scene, StereoConfig()).pending
         return StereoBackend.EXISTING if is_done else StereoBackend.CPU
     return StereoBackend.COLMAP if has_cuda else StereoBackend.CPU
-
-
-def _as_before(
-    workspace: Workspace, scene: Scene, config: StereoConfig
-) -> tuple[StereoConfig, bool]:
-    """The options that maps of ours were made with, and whether all are fresh.
-
-    Where none is ours, the given options, and there is nothing to do.
-    """
-    manifest = Manifest(workspace.stereo_path)
-    recorded = recorded_config(manifest)
-    if recorded is None:
-        return config, True
-    plans, _ = plan_stereo(workspace, scene, recorded, quiet=True)
-    passes = match_tasks(workspace, scene, plans, recorded, manifest)
-    return recorded, not _pending(passes, manifest, overwrite=False)
 
 
 def stereo_workspace(
@@ -123,14 +102,17 @@ def stereo_workspace(
         BackendUnavailableError: See `choose_backend`.
     """
     requested, backend = backend, choose_backend(backend, workspace, scene)
-    if requested is StereoBackend.AUTO and backend is StereoBackend.CPU:
-        config, _ = _as_before(workspace, scene, config)
     if backend is StereoBackend.EXISTING:
         names = [v.name for v in scene.views if workspace.map_kinds(v.name)]
         return StereoReport(backend=backend, kept=tuple(names))
     if backend is StereoBackend.COLMAP:
         return _run_colmap(workspace, scene, config)
-    return _run_cpu(workspace, scene, config, overwrite, progress or SilentProgress())
+    _check_masks(scene, config)
+    if requested is StereoBackend.AUTO and not overwrite:
+        work = plan_auto(workspace, scene, config)
+    else:
+        work = plan_work(workspace, scene, config, overwrite=overwrite)
+    return _run_cpu(workspace, scene, work, progress or SilentProgress())
 
 
 def _run_colmap(
@@ -142,25 +124,19 @@ def _run_colmap(
 
 
 def _run_cpu(
-    workspace: Workspace,
-    scene: Scene,
-    config: StereoConfig,
-    overwrite: bool,
-    progress: Progress,
+    workspace: Workspace, scene: Scene, work: StereoWork, progress: Progress
 ) -> StereoReport:
-    _check_masks(scene, config)
-    plans, skipped = plan_stereo(workspace, scene, config)
-    manifest = Manifest(workspace.stereo_path)
-    passes = match_tasks(workspace, scene, plans, config, manifest)
-    pending = _pending(passes, manifest, overwrite)
-    if pending:
-        warm_up(config)
-    loop = _Loop(workspace, scene, config, manifest)
+    for name, reason in work.skipped:
+        logger.warning("%s is skipped: %s.", name, reason)
+    if work.pending:
+        say_plan(scene, work.plans, work.config)
+        warm_up(work.config)
+    loop = _Loop(workspace, scene, work.config, work.manifest)
     matched: dict[str, None] = {}
     failed: dict[str, str] = {}
-    num_units = sum(task.which.num_units for task in pending)
+    num_units = sum(task.which.num_units for task in work.pending)
     with progress.stage("PatchMatch", num_units) as advance:
-        for task in pending:
+        for task in work.pending:
             name = scene.views[task.plan.index].name
             reason = loop.do(task, advance)
             if reason:
@@ -168,13 +144,13 @@ def _run_cpu(
                 failed[name] = reason
                 continue
             matched[name] = None
-    manifest.save()
-    names = [scene.views[plan.index].name for plan in plans]
+    work.manifest.save()
+    names = [scene.views[plan.index].name for plan in work.plans]
     report = StereoReport(
         backend=StereoBackend.CPU,
         matched=tuple(n for n in matched if n not in failed),
         kept=tuple(n for n in names if n not in matched and n not in failed),
-        skipped=(*skipped, *failed.items()),
+        skipped=(*work.skipped, *failed.items()),
     )
     _check_any(workspace, report)
     return report
@@ -235,21 +211,6 @@ class _Loop:
     @functools.cached_property
     def _model_indices(self) -> dict[int, int]:
         return read_image_indices(self.workspace.sparse_path)
-
-
-def _pending(
-    passes: Sequence[Sequence[MatchTask]], manifest: Manifest, overwrite: bool
-) -> list[MatchTask]:
-    """What is to be done, in order: first passes only where a last one needs them."""
-    *first, last = passes
-    ours = [task for task in last if overwrite or not is_fresh(task, manifest)]
-    needed = {i for task in ours for i in (task.plan.index, *task.plan.sources)}
-    return [
-        task
-        for tasks in first
-        for task in tasks
-        if task.plan.index in needed and (overwrite or not is_fresh(task, manifest))
-    ] + ours
 
 
 def _check_masks(scene: Scene, config: StereoConfig) -> None:
