@@ -207,6 +207,8 @@ class RefineConfig(Config):
         update_gating: Keep the initial depth of a pixel that other maps or the
             photographs support where the network's update is small and the photographs
             speak against it, or where it is small beside the network's expected error.
+        fit_scale: Rescale depth maps that are not at the scale of the model, by the
+            sparse points, instead of refusing them.
         tile_px: Side of a square tile, in pixels.
         overlap_px: Overlap of neighbouring tiles, in pixels.
         device: Where the network runs.
@@ -217,6 +219,7 @@ class RefineConfig(Config):
     inner_iterations: int = option("passes", 1)
     outer_iterations: int = option("rounds", 3)
     update_gating: bool = True
+    fit_scale: bool = False
     tile_px: int = 512
     overlap_px: int = 128
     device: Device = Device.AUTO

@@ -23,12 +23,14 @@ class InitialMap:
         path: Its file.
         filled: Share of pixels that have a depth, in 0..1.
         digest: Of its content.
+        scale: What its depths are multiplied with (`--fit-scale`).
     """
 
     kind: str
     path: Path
     filled: float
     digest: str
+    scale: float = 1.0
 
 
 def candidate_kinds(

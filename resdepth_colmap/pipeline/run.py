@@ -150,10 +150,8 @@ class _Run:
         num_before = None
         # COLMAP's fusion keeps no account that could be compared.
         if self.config.fuse.fuser is Fuser.OPEN3D:
-            images = result.refine.images.items()
-            kinds = {name: facts["input"] for name, facts in images}
             with self._timed("fuse_before"):
-                before = clouds.initial(kinds, overwrite)
+                before = clouds.initial(result.refine.images, overwrite)
             self.facts["fuse_before"] = before
             num_before = before["num_points"]
         self.facts["fuse"] = {**fused, "points_before_refinement": num_before}

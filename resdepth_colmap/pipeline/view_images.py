@@ -150,3 +150,12 @@ def camera_at_scale(camera: Camera, scale: float) -> Camera:
     width_px = max(1, round(camera.width_px * scale))
     height_px = max(1, round(camera.height_px * scale))
     return camera.resized(width_px, height_px)
+
+
+def camera_of_size(view: View, max_image_size: int) -> Camera:
+    """The camera of an image that is no larger than that; -1 = as it is."""
+    longest_px = max(view.camera.width_px, view.camera.height_px)
+    is_smaller = 0 < max_image_size < longest_px
+    return camera_at_scale(
+        view.camera, max_image_size / longest_px if is_smaller else 1.0
+    )

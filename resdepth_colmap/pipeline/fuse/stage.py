@@ -94,7 +94,7 @@ def fuse_workspace(
 def fuse_initial(
     workspace: Workspace,
     scene: Scene,
-    kinds: Mapping[str, str],
+    images: Mapping[str, Mapping[str, Any]],
     config: FuseConfig,
     progress: Progress | None = None,
 ) -> Consistent:
@@ -106,29 +106,31 @@ def fuse_initial(
     Args:
         workspace: The user's workspace.
         scene: Its views.
-        kinds: The kind of map that was refined, by image name.
+        images: What is known of each refined image, by name: "input", the kind of map
+            that it started from, and "scale", what that was multiplied with.
         config: Thresholds; the confidence is not used.
         progress: Who listens.
 
     Raises:
         WorkspaceError: If a map cannot be read.
     """
-    files = initial_files(workspace, scene, kinds)
+    files = initial_files(workspace, scene, images)
     return fuse_maps(files, scene, config, progress, "Fusing as it was")
 
 
 def initial_files(
-    workspace: Workspace, scene: Scene, kinds: Mapping[str, str]
+    workspace: Workspace, scene: Scene, images: Mapping[str, Mapping[str, Any]]
 ) -> list[MapFiles]:
     """The maps before the refinement, of the kind that was refined of each image."""
     return [
         MapFiles(
             view=view,
             image_path=workspace.image_path(view.name),
-            depth_path=map_path(workspace, view.name, kinds[view.name]),
+            depth_path=map_path(workspace, view.name, images[view.name]["input"]),
+            depth_scale=float(images[view.name].get("scale", 1.0)),
         )
         for view in scene.views
-        if view.name in kinds
+        if view.name in images
     ]
 
 

@@ -122,22 +122,28 @@ class Clouds:
 
         return self._made(self._task(path, files), make, overwrite)
 
-    def initial(self, kinds: Mapping[str, str], overwrite: bool) -> dict[str, Any]:
+    def initial(
+        self, images: Mapping[str, Mapping[str, Any]], overwrite: bool
+    ) -> dict[str, Any]:
         """A sample of the cloud that the initial maps give; what is known of it.
 
         Args:
-            kinds: The kind of map that was refined, by image name.
+            images: What is known of each refined image (`fuse_initial`).
             overwrite: Make it also if it is fresh.
 
         Raises:
             WorkspaceError: If a map cannot be read or the cloud not be written.
         """
         path = cloud_before_path(self._output)
-        files = initial_files(self._output.source, self._scene, kinds)
+        files = initial_files(self._output.source, self._scene, images)
 
         def make() -> dict[str, Any]:
             before = fuse_initial(
-                self._output.source, self._scene, kinds, self._config, self._progress
+                self._output.source,
+                self._scene,
+                images,
+                self._config,
+                self._progress,
             )
             path.unlink(missing_ok=True)
             if len(before.cloud):
@@ -183,7 +189,7 @@ class Clouds:
         digests = [
             known.of(p) if p is not None and p.is_file() else None for p in paths
         ]
-        return [view_facts(file.view), digests]
+        return [view_facts(file.view), digests, file.depth_scale]
 
     def _model(self) -> list[str]:
         """COLMAP's fusion finds neighbours by the points of the sparse model."""

@@ -73,6 +73,7 @@ class MapFiles:
         view: The view.
         image_path: Its image.
         depth_path: Its depth map, which may be smaller than the image.
+        depth_scale: What its depths are multiplied with.
         normal_path: Its normal map; None, or no file there = computed from the depth.
         confidence_path: Its confidence; None, or no file there = 1 everywhere.
     """
@@ -80,6 +81,7 @@ class MapFiles:
     view: View
     image_path: Path
     depth_path: Path
+    depth_scale: float = 1.0
     normal_path: Path | None = None
     confidence_path: Path | None = None
 
@@ -90,6 +92,8 @@ class MapFiles:
             WorkspaceError: If a file is broken, or two maps differ in size.
         """
         depth = read_depth_map(self.depth_path)
+        if self.depth_scale != 1.0:
+            depth = np.float32(self.depth_scale) * depth
         height_px, width_px = depth.shape
         K = index_K(self.view.camera.resized(width_px, height_px))
         rgb = read_rgb(self.image_path)

@@ -2,6 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from resdepth_colmap.geometry.pixels import index_K
 from resdepth_colmap.pipeline.refine.cross_view import SourceMap
 from resdepth_colmap.pipeline.refine.plan import ViewTask
@@ -25,9 +27,12 @@ def load_view(task: ViewTask, scene: Scene, images: ViewImages) -> ViewInputs:
         scene,
         task.index,
         [choice.index for choice in task.sources],
-        images.whole_map(task.initial.path),
+        _scaled(images.whole_map(task.initial.path), task.initial.scale),
         images,
-        {index: images.whole_map(path) for index, path in task.source_maps},
+        {
+            found.view_index: _scaled(images.whole_map(found.path), found.scale)
+            for found in task.source_maps
+        },
     )
 
 
@@ -79,6 +84,10 @@ def view_inputs(
             for other, source_depth in (maps or {}).items()
         ),
     )
+
+
+def _scaled(depth: DepthMap, scale: float) -> DepthMap:
+    return depth if scale == 1.0 else np.float32(scale) * depth
 
 
 def _source_map(source: View, reference: View, depth: DepthMap) -> SourceMap:

@@ -13,6 +13,7 @@ from resdepth_colmap.io.colmap.depth_map import write_depth_map
 from resdepth_colmap.io.colmap.output import OutputWorkspace
 from resdepth_colmap.network.unet import ResDepthNet
 from resdepth_colmap.pipeline.manifest import Manifest
+from resdepth_colmap.pipeline.map_scale import check_scales, initial_scales
 from resdepth_colmap.pipeline.refine.load_view import load_view
 from resdepth_colmap.pipeline.refine.plan import (
     ITERATIONS_FOLDER,
@@ -73,6 +74,10 @@ class RefineLoop:
         """
         *_, last = plan.iterations
         pending = [t for t in last if overwrite or not self._manifest.is_fresh(t)]
+        if pending and not self._config.fit_scale:
+            maps = {task.index: task.initial for task in last}
+            fits = initial_scales(self._output.source, self._scene, maps)
+            check_scales(self._scene, maps, fits)
         if overwrite:
             self._forget_earlier(plan)
         for iteration, needed in enumerate(_needed(plan, pending)):
@@ -113,7 +118,7 @@ def _needed(plan: RefinePlan, pending: list[ViewTask]) -> list[list[ViewTask]]:
     """Of each iteration the tasks whose maps the next one's tasks look at."""
     needed = [pending]
     for tasks in reversed(plan.iterations[:-1]):
-        looked_at = {index for task in needed[0] for index, _ in task.source_maps}
+        looked_at = {it.view_index for task in needed[0] for it in task.source_maps}
         needed.insert(0, [task for task in tasks if task.index in looked_at])
     return needed
 
@@ -131,8 +136,9 @@ def view_record(
     change = float(np.median(np.abs(after - before) / before)) if known.any() else 0.0
     return {
         "input": task.initial.kind,
+        "scale": task.initial.scale,
         "sources": _sources(task.sources, scene),
-        "source_maps": [scene.views[index].name for index, _ in task.source_maps],
+        "source_maps": [scene.views[it.view_index].name for it in task.source_maps],
         "filled_before": round(task.initial.filled, 6),
         "filled_after": round(float(np.mean(result.depth > 0)), 6),
         "median_relative_change": round(change, 6),

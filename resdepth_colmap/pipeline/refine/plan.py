@@ -5,7 +5,7 @@ import importlib.metadata
 import logging
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from resdepth_colmap.config import RefineConfig
 from resdepth_colmap.geometry.view_selection import SourceChoice, choose_sources
@@ -20,6 +20,7 @@ from resdepth_colmap.pipeline.initial_map import (
     choose_initial_map,
 )
 from resdepth_colmap.pipeline.manifest import Manifest, Task, key_of, view_facts
+from resdepth_colmap.pipeline.map_scale import fitted_scales, initial_scales
 from resdepth_colmap.pipeline.refine.cross_view import NUM_SOURCE_MAPS
 from resdepth_colmap.scene import Scene
 
@@ -33,6 +34,20 @@ Skipped = tuple[tuple[str, str], ...]
 """Name and reason of each image that is not refined."""
 
 
+class MapRead(NamedTuple):
+    """A depth map to read.
+
+    Attributes:
+        view_index: Of its view in the scene.
+        path: Its file.
+        scale: What its depths are multiplied with.
+    """
+
+    view_index: int
+    path: Path
+    scale: float = 1.0
+
+
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class ViewTask(Task):
     """One view to refine in one outer iteration.
@@ -42,8 +57,8 @@ class ViewTask(Task):
         iteration: Outer iteration, from 0.
         initial: The depth map that it starts from.
         sources: Its second views, best first; () for a network that needs none.
-        source_maps: Views whose depth maps it is compared with, by index, and the file
-            of each: its initial map, or what the iteration before made of it.
+        source_maps: The depth maps of other views that it is compared with: initial
+            ones, or what the iteration before made of them.
         reads: All files that it reads: images and depth maps.
     """
 
@@ -51,7 +66,7 @@ class ViewTask(Task):
     iteration: int
     initial: InitialMap
     sources: tuple[SourceChoice, ...]
-    source_maps: tuple[tuple[int, Path], ...]
+    source_maps: tuple[MapRead, ...]
     reads: tuple[Path, ...]
 
 
@@ -125,6 +140,8 @@ class _Planner:
         self.fingerprints = manifest.fingerprints
         self._first_keys: dict[int, str] = {}
         self.initial = [self._initial_map(index) for index in range(len(scene.views))]
+        if config.fit_scale:
+            self._fit_scales()
 
     def first_iteration(self) -> tuple[tuple[ViewTask, ...], Skipped]:
         """Each view compared with the initial maps of others."""
@@ -159,9 +176,11 @@ class _Planner:
 
         def after(task: ViewTask) -> ViewTask:
             maps, keys = [], []
-            for index, path in task.source_maps:
-                other = made.get(index)
-                maps.append((index, other.writes[0] if other else path))
+            for found in task.source_maps:
+                other = made.get(found.view_index)
+                maps.append(
+                    MapRead(found.view_index, other.writes[0]) if other else found
+                )
                 keys.append(other.key if other else None)
             iteration = task.iteration + 1
             return dataclasses.replace(
@@ -189,7 +208,7 @@ class _Planner:
     ) -> ViewTask:
         name, initial = self.scene.views[index].name, self._initial(index)
         maps = tuple(
-            (other, found.path)
+            MapRead(other, found.path, found.scale)
             for other in others
             if (found := self.initial[other]) is not None
         )
@@ -218,9 +237,9 @@ class _Planner:
                 "options": self._options(),
                 "views": [view_facts(view) for view in seen],
                 "images": [self._image(view.name) for view in seen],
-                "map": [initial.kind, initial.digest],
+                "map": [initial.kind, *_content(initial)],
                 "source_maps": [
-                    [view_facts(views[other]), found.digest if found else None]
+                    [view_facts(views[other]), _content(found)]
                     for other in others
                     for found in [self.initial[other]]
                 ],
@@ -244,14 +263,14 @@ class _Planner:
         self,
         index: int,
         sources: tuple[SourceChoice, ...],
-        maps: tuple[tuple[int, Path], ...],
+        maps: tuple[MapRead, ...],
     ) -> tuple[Path, ...]:
         indices = (index, *(choice.index for choice in sources))
         images = (self.scene.views[i].name for i in indices)
         return (
             *(self.workspace.image_path(name) for name in images),
             self._initial(index).path,
-            *(path for _, path in maps),
+            *(found.path for found in maps),
         )
 
     def _initial(self, index: int) -> InitialMap:
@@ -268,6 +287,15 @@ class _Planner:
             self.workspace, view.name, view.camera, kinds, self.fingerprints
         )
 
+    def _fit_scales(self) -> None:
+        """Give each map that is off the scale of the model."""
+        maps = {index: it for index, it in enumerate(self.initial) if it is not None}
+        fits = initial_scales(self.workspace, self.scene, maps)
+        for index, factor in fitted_scales(self.scene, fits).items():
+            found = self.initial[index]
+            if found is not None:
+                self.initial[index] = dataclasses.replace(found, scale=factor)
+
     def _image(self, name: str) -> str | None:
         path = self.workspace.image_path(name)
         return self.fingerprints.of(path) if path.is_file() else None
@@ -281,6 +309,10 @@ class _Planner:
         if not kinds:
             return "no depth map"
         return f"no {self.config.input} depth map (there is: {', '.join(kinds)})"
+
+
+def _content(found: InitialMap | None) -> list[Any]:
+    return [] if found is None else [found.digest, found.scale]
 
 
 def _stage(iteration: int) -> str:

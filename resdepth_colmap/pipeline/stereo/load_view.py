@@ -14,7 +14,7 @@ from resdepth_colmap.io.colmap.workspace import Workspace
 from resdepth_colmap.matching.patch_match import MatchView, Surface
 from resdepth_colmap.pipeline.stereo.depth_range_probe import PROBE_SIDE_PX, is_wide
 from resdepth_colmap.pipeline.stereo.passes import GEOMETRIC, PHOTOMETRIC, MatchTask
-from resdepth_colmap.pipeline.view_images import ViewImages, camera_at_scale
+from resdepth_colmap.pipeline.view_images import ViewImages, camera_of_size
 from resdepth_colmap.scene import Camera, DepthMap, NormalMap, Scene, View
 
 BYTES_PER_GB = 1 << 30  # COLMAP's unit of cache_size
@@ -145,14 +145,14 @@ class MatchLoader:
         """The view and its sources at that size."""
         indices = (task.plan.index, *task.plan.sources)
         reference, *sources = (
-            self._match_view(view, _camera_of_size(view, max_image_size))
+            self._match_view(view, camera_of_size(view, max_image_size))
             for view in (self._scene.views[index] for index in indices)
         )
         return reference, sources
 
     def _camera(self, view: View) -> Camera:
         """The camera at matching size."""
-        return _camera_of_size(view, self._config.max_image_size)
+        return camera_of_size(view, self._config.max_image_size)
 
     def _match_view(self, view: View, camera: Camera) -> MatchView:
         return MatchView(
@@ -169,12 +169,3 @@ class MatchLoader:
             if path.is_file():
                 return read_mask(path, size)
         return np.ones(size[::-1], np.bool_)
-
-
-def _camera_of_size(view: View, max_image_size: int) -> Camera:
-    """The camera of an image that is no larger than that; -1 = as it is."""
-    longest_px = max(view.camera.width_px, view.camera.height_px)
-    is_smaller = 0 < max_image_size < longest_px
-    return camera_at_scale(
-        view.camera, max_image_size / longest_px if is_smaller else 1.0
-    )

@@ -95,7 +95,7 @@ def test_two_views_are_a_workspace(tmp_path: Path) -> None:
 
 def test_exact_maps_before_give_as_many_points_as_after(tmp_path: Path) -> None:
     output, scene = _write(tmp_path)
-    kinds = {view.name: "photometric" for view in scene.views}
+    kinds = {view.name: {"input": "photometric"} for view in scene.views}
     for view in scene.views:
         path = output.source.depth_map_path(view.name, "photometric")
         write_depth_map(path, fuse_view(view).depth)
