@@ -16,7 +16,7 @@ from resdepth_colmap.evaluation.datasets.sample import (
 )
 from resdepth_colmap.geometry.depth_range import depth_range
 from resdepth_colmap.geometry.pixels import index_K
-from resdepth_colmap.geometry.resize import nearest_depth
+from resdepth_colmap.geometry.resize import nearest_resized
 from resdepth_colmap.geometry.view_selection import choose_sources
 from resdepth_colmap.io.colmap.cfg import SourceKind, read_sources
 from resdepth_colmap.io.colmap.depth_map import read_depth_map
@@ -156,7 +156,7 @@ def _map_of(workspace: Workspace, view: View) -> DepthMap | None:
     if not kinds:
         return None
     found = choose_initial_map(workspace, view.name, view.camera, kinds)
-    return nearest_depth(found.depth, (view.camera.height_px, view.camera.width_px))
+    return nearest_resized(found.depth, (view.camera.width_px, view.camera.height_px))
 
 
 def _check_shape(path: Path, shape: tuple[int, ...], view: View) -> None:

@@ -15,6 +15,7 @@ from resdepth_colmap.config import StereoConfig
 from resdepth_colmap.geometry.holes import fill_holes
 from resdepth_colmap.geometry.normals import normals_from_depth
 from resdepth_colmap.geometry.pixels import index_K
+from resdepth_colmap.geometry.resize import nearest_resized
 from resdepth_colmap.io.colmap.consistency_graph import write_consistency_graph
 from resdepth_colmap.io.colmap.depth_map import write_depth_map
 from resdepth_colmap.io.colmap.masks import Wanted, mask_file, read_mask
@@ -231,7 +232,7 @@ class ViewMatcher:
         if self.config.mask_path is not None:
             path = mask_file(self.config.mask_path, view.name)
             if path.is_file():
-                return read_mask(path, size)
+                return nearest_resized(read_mask(path), size)
         return np.ones(size[::-1], np.bool_)
 
 
