@@ -17,6 +17,7 @@ from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.geometry.inverse_depth import invert_map
 from resdepth_colmap.geometry.pixels import index_K
 from resdepth_colmap.geometry.projection import project, transform
+from resdepth_colmap.geometry.resize import nearest_resized
 from resdepth_colmap.geometry.view_selection import choose_sources
 from resdepth_colmap.geometry.warp import warp_to_reference
 from resdepth_colmap.io.colmap.depth_map import read_depth_map
@@ -25,11 +26,7 @@ from resdepth_colmap.io.colmap.workspace import Workspace
 from resdepth_colmap.pipeline.initial_map import InitialMap
 from resdepth_colmap.pipeline.refine.photometric_error import photometric_error
 from resdepth_colmap.pipeline.refine.source_sampler import SourceTensors
-from resdepth_colmap.pipeline.view_images import (
-    ViewImages,
-    camera_of_size,
-    nearest_resized,
-)
+from resdepth_colmap.pipeline.view_images import ViewImages, camera_of_size
 from resdepth_colmap.scene import DepthMap, Matrix, Scene, View, cam_from_cam
 
 logger = logging.getLogger(__name__)

@@ -2,10 +2,10 @@
 
 import dataclasses
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 
+from resdepth_colmap.geometry.resize import area_resized
 from resdepth_colmap.io.open3d_library import load_open3d
 from resdepth_colmap.scene import DepthMap, View
 from resdepth_colmap.synthetic.room import Light, Room
@@ -104,10 +104,7 @@ class Tracer:
         block = self._light_samples(len(directions), width)
         color = self._trace(origin, directions, footprint, block)
         fine = color.reshape(-1, width, 3)
-        size = (view.camera.width_px, view.camera.height_px)
-        return np.asarray(
-            cv2.resize(fine, size, interpolation=cv2.INTER_AREA), np.float32
-        )
+        return area_resized(fine, (view.camera.width_px, view.camera.height_px))
 
     @staticmethod
     def _light_samples(count: int, width: int) -> Indices:

@@ -2,10 +2,10 @@
 
 from collections.abc import Sequence
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 
+from resdepth_colmap.geometry.resize import area_resized
 from resdepth_colmap.synthetic.textures import Picture
 
 Floats = npt.NDArray[np.float32]
@@ -32,8 +32,7 @@ class Atlas:
                 levels.append(np.round(level * 255).astype(np.uint8).reshape(-1, 3))
                 total += len(levels[-1])
                 half = max(len(level) // 2, 1)
-                smaller = cv2.resize(level, (half, half), interpolation=cv2.INTER_AREA)
-                level = np.asarray(smaller, dtype=np.float32)
+                level = area_resized(level, (half, half))
         self._texels = np.concatenate(levels)
         # what a screen shows to what a surface reflects
         self._linear = (np.arange(256, dtype=np.float32) / 255) ** 2.2

@@ -8,6 +8,7 @@ from resdepth_colmap.config import StereoConfig
 from resdepth_colmap.geometry.holes import fill_holes
 from resdepth_colmap.geometry.normals import normals_from_depth
 from resdepth_colmap.geometry.pixels import index_K
+from resdepth_colmap.geometry.resize import nearest_resized
 from resdepth_colmap.io.colmap.masks import Wanted, mask_file, read_mask
 from resdepth_colmap.io.colmap.normal_map import read_normal_map
 from resdepth_colmap.io.colmap.workspace import Workspace
@@ -167,5 +168,5 @@ class MatchLoader:
         if self._config.mask_path is not None:
             path = mask_file(self._config.mask_path, view.name)
             if path.is_file():
-                return read_mask(path, size)
+                return nearest_resized(read_mask(path), size)
         return np.ones(size[::-1], np.bool_)
