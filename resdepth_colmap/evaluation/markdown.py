@@ -31,31 +31,42 @@ class Column(NamedTuple):
         return formatted(value, self.form, self.scale)
 
 
-def grouped(groups: Mapping[str, str], columns: Sequence[Column]) -> list[Column]:
+def columns(form: str, titles: Mapping[str, str], scale: float = 1) -> list[Column]:
+    """Columns of one form.
+
+    Args:
+        form: See `Column`.
+        titles: The head of each by the path of its value.
+        scale: See `Column`.
+    """
+    return [Column(title, path, form, scale) for path, title in titles.items()]
+
+
+def grouped(groups: Mapping[str, str], parts: Sequence[Column]) -> list[Column]:
     """The same columns for each part of a row.
 
     Args:
         groups: Title of each part by its key.
-        columns: Of each part; their values are paths.
+        parts: Columns of a part; their values are paths.
     """
     return [
-        column._replace(title=f"{title}: {column.title}", value=f"{key}/{column.value}")
+        column._replace(title=f"{column.title}: {title}", value=f"{key}/{column.value}")
         for key, title in groups.items()
-        for column in columns
+        for column in parts
     ]
 
 
-def table(columns: Sequence[Column], rows: Iterable[Any]) -> str:
+def table(shown: Sequence[Column], rows: Iterable[Any]) -> str:
     """A table with one line a row.
 
     Args:
-        columns: What each row shows.
+        shown: The columns.
         rows: Mappings, or what the functions of the columns take.
     """
-    rule = "|".join("--:" if column.form else "---" for column in columns)
-    lines = [_line([column.title for column in columns]), f"|{rule}|"]
+    rule = "|".join("--:" if column.form else "---" for column in shown)
+    lines = [_line([column.title for column in shown]), f"|{rule}|"]
     return "\n".join(
-        lines + [_line([column.cell(row) for column in columns]) for row in rows]
+        lines + [_line([column.cell(row) for column in shown]) for row in rows]
     )
 
 

@@ -32,7 +32,7 @@ def test_a_table_without_rows_is_its_head() -> None:
 def test_grouped_columns_look_into_their_part_of_the_row() -> None:
     columns = grouped({"a": "first", "b": "second"}, (Column("MAE", "mae", ".1f"),))
     assert table(columns, [{"a": {"mae": 1}, "b": {"mae": 2}}]).splitlines() == [
-        "| first: MAE | second: MAE |",
+        "| MAE: first | MAE: second |",
         "|--:|--:|",
         "| 1.0 | 2.0 |",
     ]

@@ -13,31 +13,35 @@ from resdepth_colmap.evaluation.depth.tables import (
     error_rows,
     origins,
 )
-from resdepth_colmap.evaluation.markdown import Column, Measured, table
+from resdepth_colmap.evaluation.markdown import Measured, columns, table
 
-PAPER = (
-    Column("scene", "scene"),
-    Column("pairs", "num_views", ","),
-    Column("refined: MAE", "refined/mae", ".2f"),
-    Column("RMSE", "refined/rmse", ".2f"),
-    Column("unfiltered: MAE", "unfiltered/mae", ".2f"),
-    Column("RMSE", "unfiltered/rmse", ".2f"),
-    Column("paper: pairs", "paper/num_pairs", ","),
-    Column("ResDepth-stereo: MAE", "paper/refined_mae", ".2f"),
-    Column("RMSE", "paper/refined_rmse", ".2f"),
-    Column("COLMAP (unfilt.): MAE", "paper/unfiltered_mae", ".2f"),
-    Column("RMSE", "paper/unfiltered_rmse", ".2f"),
-)
-ERRORS = (
+SCORES = {
+    "refined/mae": "refined: MAE",
+    "refined/rmse": "RMSE",
+    "unfiltered/mae": "unfiltered: MAE",
+    "unfiltered/rmse": "RMSE",
+}
+PUBLISHED = {
+    "paper/refined_mae": "ResDepth-stereo: MAE",
+    "paper/refined_rmse": "RMSE",
+    "paper/unfiltered_mae": "COLMAP (unfilt.): MAE",
+    "paper/unfiltered_rmse": "RMSE",
+}
+PAPER = [
+    *columns("", {"scene": "scene"}),
+    *columns(",", {"num_views": "pairs"}),
+    *columns(".2f", SCORES),
+    *columns(",", {"paper/num_pairs": "paper: pairs"}),
+    *columns(".2f", PUBLISHED),
+]
+ERRORS = [
     *NAMES,
-    Column("MAE, m", "mae", ".3f"),
-    Column("RMSE, m", "rmse", ".3f"),
-    Column("MedAE, m", "medae", ".3f"),
-    Column("off by > 1 cm", "bad_1cm", ".1%"),
-    Column("> 2 cm", "bad_2cm", ".1%"),
-    Column("> 5 cm", "bad_5cm", ".1%"),
+    *columns(".3f", {"mae": "MAE, m", "rmse": "RMSE, m", "medae": "MedAE, m"}),
+    *columns(
+        ".1%", {"bad_1cm": "off by > 1 cm", "bad_2cm": "> 2 cm", "bad_5cm": "> 5 cm"}
+    ),
     *PIXELS,
-)
+]
 _CAVEAT = (
     "The paper's figures are those of its table, not measured here: of other pairs, "
     "picked by hand, refined by a network that was trained on ETH3D."

@@ -3,37 +3,33 @@
 from collections.abc import Iterator
 from typing import Any
 
-from resdepth_colmap.evaluation.markdown import Column, Measured, grouped, table
+from resdepth_colmap.evaluation.markdown import Measured, columns, grouped, table
 
 DEPTHS = {"unfiltered": "unfiltered", "median": "5 x 5 median", "refined": "refined"}
 """The depth maps that are compared, and what tables call them."""
 
 OVERALL = "**overall**"
 NO_SCENE = "No scene could be compared."
-NAMES = (Column("scene", "scene"), Column("depth", "depth"))
-PIXELS = (Column("valid pixels", "num_valid", ","), Column("of", "num_pixels", ","))
-ERRORS = (
+NAMES = columns("", {"scene": "scene", "depth": "depth"})
+PIXELS = columns(",", {"num_valid": "valid pixels", "num_pixels": "of"})
+ERRORS = [
     *NAMES,
-    Column("MAE", "mae", ".4f"),
-    Column("RMSE", "rmse", ".4f"),
-    Column("MedAE", "medae", ".4f"),
-    Column("off by > 1 %", "bad_1", ".1%"),
-    Column("off by > 2 %", "bad_2", ".1%"),
+    *columns(".4f", {"mae": "MAE", "rmse": "RMSE", "medae": "MedAE"}),
+    *columns(".1%", {"bad_1": "off by > 1 %", "bad_2": "off by > 2 %"}),
     *PIXELS,
-)
+]
 REGIONS = {"edges": "edges", "flat": "flat areas"}
-REGION_ERRORS = (
+REGION_ERRORS = [
     *NAMES,
     *grouped(
         REGIONS,
-        (
-            Column("MAE", "mae", ".4f"),
-            Column("MedAE", "medae", ".4f"),
-            Column("off by > 2 %", "bad_2", ".1%"),
-            Column("pixels", "num_pixels", ","),
-        ),
+        [
+            *columns(".4f", {"mae": "MAE", "medae": "MedAE"}),
+            *columns(".1%", {"bad_2": "off by > 2 %"}),
+            *columns(",", {"num_pixels": "pixels"}),
+        ],
     ),
-)
+]
 
 
 def depth_table(measured: Measured) -> str:

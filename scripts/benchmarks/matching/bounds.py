@@ -66,7 +66,7 @@ def count_evaluations(
     def counted(levels, K, planes, costs, sources, *rest):
         kernel(levels, K, planes, costs, CountedSources(*sources, count), *rest)
 
-    # The matcher looks its kernel up in the module at each call.
+    # The matcher takes its kernel from the module at each call.
     setattr(sweeps, "sweep", counted)  # noqa: B010 (mypy wants a kernel there)
     try:
         patch_match.match_view(views[0], views[1:], depth_range, config)

@@ -3,23 +3,25 @@
 from collections.abc import Iterator
 from typing import Any
 
-from resdepth_colmap.evaluation.markdown import Column, Measured, at, grouped
+from resdepth_colmap.evaluation.markdown import Measured, at, columns, grouped
 
 FUSERS = {"open3d": "ours", "colmap": "COLMAP"}
-CLOUDS = (
-    Column("workspace", "workspace"),
-    Column("maps", "method"),
-    Column("within", "open3d/scores/tolerances", ".4g"),
+SCORES = {
+    "scores/accuracy": "accuracy",
+    "scores/completeness": "completeness",
+    "scores/f1": "F1",
+}
+CLOUDS = [
+    *columns("", {"workspace": "workspace", "method": "maps"}),
+    *columns(".4g", {"open3d/scores/tolerances": "within"}),
     *grouped(
         FUSERS,
-        (
-            Column("points", "num_points", ","),
-            Column("accuracy", "scores/accuracy", ".1%"),
-            Column("completeness", "scores/completeness", ".1%"),
-            Column("F1", "scores/f1", ".1%"),
-        ),
+        [
+            *columns(",", {"num_points": "points"}),
+            *columns(".1%", SCORES),
+        ],
     ),
-)
+]
 METRICS = {
     "coverage": "coverage",
     "consistent": "consistent",
@@ -32,10 +34,13 @@ METRICS = {
 }
 """The metrics of `MEASURES` that are shown, and their columns."""
 
-PAIRED = (
-    Column("workspace", "workspace"),
-    Column("difference", "pair"),
-    *(Column(title, f"metrics/{key}") for key, title in METRICS.items()),
+PAIRED = columns(
+    "",
+    {
+        "workspace": "workspace",
+        "pair": "difference",
+        **{f"metrics/{key}": title for key, title in METRICS.items()},
+    },
 )
 
 

@@ -3,37 +3,33 @@
 from collections.abc import Iterator
 from typing import Any
 
-from resdepth_colmap.evaluation.markdown import Column, Measured
+from resdepth_colmap.evaluation.markdown import Column, Measured, columns
 
-COMMANDS = (
+MIB = 1 / 1024
+COMMANDS = [
     Column("command", lambda row: f"`{row['command']}`"),
-    Column("on", "what"),
-    Column("seconds", "seconds", ".1f"),
-    Column("processor seconds", "cpu_seconds", ".1f"),
-    Column("peak memory, GiB", "peak_memory_mb", ".2f", 1 / 1024),
-)
-WORKSPACES = (
-    Column("workspace", "name"),
+    *columns("", {"what": "on"}),
+    *columns(".1f", {"seconds": "seconds", "cpu_seconds": "processor seconds"}),
+    *columns(".2f", {"peak_memory_mb": "peak memory, GiB"}, MIB),
+]
+STAGES = {"seconds/stereo": "stereo, s", "seconds/refine": "refine, s"}
+WORKSPACES = [
+    *columns("", {"name": "workspace"}),
     Column("command", lambda row: f"`{' '.join(['refine', *row['options']])}`"),
-    Column("images", "num_images", ","),
-    Column("stereo, s", "seconds/stereo", ".1f"),
-    Column("refine, s", "seconds/refine", ".1f"),
-    Column("in all, s", "seconds_in_all", ".1f"),
-    Column("peak memory, GiB", "peak_memory_mb", ".1f", 1 / 1024),
-    Column("points: before", "points_before", ","),
-    Column("after", "points_after", ","),
-    Column("filled: before", "filled_before", ".0%"),
-    Column("after", "filled_after", ".0%"),
-    Column("date", "date"),
-)
+    *columns(",", {"num_images": "images"}),
+    *columns(".1f", {**STAGES, "seconds_in_all": "in all, s"}),
+    *columns(".1f", {"peak_memory_mb": "peak memory, GiB"}, MIB),
+    *columns(",", {"points_before": "points: before", "points_after": "after"}),
+    *columns(".0%", {"filled_before": "filled: before", "filled_after": "after"}),
+    *columns("", {"date": "date"}),
+]
 SCORES = ("accuracy", "completeness", "f1")
-CLOUDS = (
-    Column("sample", "sample"),
-    Column("tolerances, m", "tolerances"),
-    Column("F1 at the smallest: official", "official/f1", ".3%"),
-    Column("ours", "ours/f1", ".3%"),
-    Column("largest difference of all scores, points of 100", "difference", ".4f", 100),
-)
+DIFFERENCE = "largest difference of all scores, points of 100"
+CLOUDS = [
+    *columns("", {"sample": "sample", "tolerances": "tolerances, m"}),
+    *columns(".3%", {"official/f1": "F1 at the smallest: official", "ours/f1": "ours"}),
+    *columns(".4f", {"difference": DIFFERENCE}, 100),
+]
 
 
 def workspace_rows(measured: Measured) -> Iterator[dict[str, Any]]:

@@ -5,24 +5,28 @@ from statistics import fmean
 from typing import Any
 
 from resdepth_colmap.evaluation.depth.tables import DEPTHS
-from resdepth_colmap.evaluation.markdown import Column, Measured, formatted
+from resdepth_colmap.evaluation.markdown import Column, Measured, columns, formatted
 
 ERRORS = ("mae", "rmse", "medae", "bad_2")
-SCENES = (
-    Column("scene", "scene"),
-    *(Column(f"MAE, m: {DEPTHS[key]}", f"{key}/mae", ".3f") for key in DEPTHS),
-    Column("off by > 2 %: unfiltered", "unfiltered/bad_2", ".1%"),
-    Column("off by > 2 %: refined", "refined/bad_2", ".1%"),
-)
-ACCURACY = (
-    Column("`evaluate depth ...`", "options"),
+MAES = {f"{key}/mae": f"MAE, m: {label}" for key, label in DEPTHS.items()}
+BAD = {f"{key}/bad_2": f"off by > 2 %: {key}" for key in ("unfiltered", "refined")}
+RATIOS = {
+    "mae_ratio": "MAE ratio",
+    "worst_mae_ratio": "worst scene",
+    "medae_ratio": "MedAE ratio",
+    "worst_medae_ratio": "worst scene",
+}
+SCENES = [
+    *columns("", {"scene": "scene"}),
+    *columns(".3f", MAES),
+    *columns(".1%", BAD),
+]
+ACCURACY = [
+    *columns("", {"options": "`evaluate depth ...`"}),
     *SCENES[1:],
-    Column("MAE ratio", "mae_ratio", ".2f"),
-    Column("worst scene", "worst_mae_ratio", ".2f"),
-    Column("MedAE ratio", "medae_ratio", ".2f"),
-    Column("worst scene", "worst_medae_ratio", ".2f"),
+    *columns(".2f", RATIOS),
     Column("scenes with fewer off", lambda it: f"{it['num_fewer']} of {it['num']}"),
-)
+]
 
 
 def scene_rows(measured: Measured) -> Iterator[dict[str, Any]]:

@@ -31,7 +31,7 @@ class Block(NamedTuple):
 
 def block(
     names: Sequence[str],
-    columns: Sequence[Column],
+    shown: Sequence[Column],
     rows: Callable[..., Iterable[Any]],
     note: Renderer | None = None,
 ) -> Block:
@@ -39,7 +39,7 @@ def block(
 
     Args:
         names: Names of the records.
-        columns: The columns of the table.
+        shown: The columns of the table.
         rows: Makes the rows of the records.
         note: Makes a further sentence of the records.
     """
@@ -50,7 +50,7 @@ def block(
         lines = textwrap.fill(
             text, WIDTH, break_long_words=False, break_on_hyphens=False
         )
-        return f"{table(columns, rows(*records))}\n\n{lines}"
+        return f"{table(shown, rows(*records))}\n\n{lines}"
 
     return Block(tuple(names), render)
 

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from statistics import fmean
 from typing import Any
 
-from resdepth_colmap.evaluation.markdown import Column, Measured, at, grouped
+from resdepth_colmap.evaluation.markdown import Measured, at, columns, grouped
 
 KINDS = ("photometric", "geometric")
 OPENMVS = {
@@ -15,31 +15,31 @@ OPENMVS = {
 """OpenMVS 2.3 on a CPU, cited. Middlebury: full resolution, no filter, one neighbour,
 holes are wrong. Rendered: unfiltered, five neighbours."""
 
-TRUTH = (
-    Column("data", "data"),
+TRUTH = [
+    *columns("", {"data": "data"}),
     *grouped(
         {**dict(zip(KINDS, KINDS, strict=True)), "openmvs": "OpenMVS 2.3, cited"},
-        (
-            Column("off by > 1 %", "off_1", ".1%"),
-            Column("median error", "median", ".3%"),
-            Column("s a map", "cpu_s", ".1f"),
-        ),
+        [
+            *columns(".1%", {"off_1": "off by > 1 %"}),
+            *columns(".3%", {"median": "median error"}),
+            *columns(".1f", {"cpu_s": "s a map"}),
+        ],
     ),
-    Column("cloud: F1", "f1", ".1%"),
-)
+    *columns(".1%", {"f1": "cloud: F1"}),
+]
 LIMITS = {"within_1": "0.01", "within_2": "0.02", "within_5": "0.05"}
-NEAR_COLMAP = (
-    Column("maps", "maps"),
-    *(Column(f"within {key[-1]} %", key, ".1%") for key in LIMITS),
-    Column("within 1 %: worst image", "worst", ".1%"),
-    Column("best image", "best", ".1%"),
-)
-SPEED = (
-    Column("megapixels", "megapixels", ".2f"),
-    Column("sources", "num_sources", ","),
-    Column("s", "cpu_s", ".2f"),
-    Column("s a megapixel, source, iteration", "cpu_s_per_mp_source_iteration", ".2f"),
-)
+NEAREST = {"worst": "within 1 %: worst image", "best": "best image"}
+NEAR_COLMAP = [
+    *columns("", {"maps": "maps"}),
+    *columns(".1%", {key: f"within {key[-1]} %" for key in LIMITS}),
+    *columns(".1%", NEAREST),
+]
+PER_UNIT = {"cpu_s_per_mp_source_iteration": "s a megapixel, source, iteration"}
+SPEED = [
+    *columns(".2f", {"megapixels": "megapixels"}),
+    *columns(",", {"num_sources": "sources"}),
+    *columns(".2f", {"cpu_s": "s", **PER_UNIT}),
+]
 
 
 def truth_rows(measured: Measured) -> Iterator[dict[str, Any]]:

@@ -3,7 +3,7 @@
 from operator import itemgetter
 from typing import Any
 
-from resdepth_colmap.evaluation.markdown import Column, Measured, table
+from resdepth_colmap.evaluation.markdown import Column, Measured, columns, table
 
 HASH_DIGITS = 12
 """As many digits of a SHA-256 identify a weights file."""
@@ -19,20 +19,16 @@ CHANNELS = {
     "red": "the photo's red",
     "blue": "and blue",
 }
-STAGES = (
-    Column("stage", "stage"),
-    Column("starts from", "starts_from"),
-    Column("maps", "maps"),
-    Column("rooms", "num_rooms", ","),
-    Column("views", "num_views", ","),
-    Column("steps", "steps", ","),
-    Column("batch and crop, px", "batch"),
-    Column("learning rate", "learning_rate", "g"),
-    Column("minutes", "minutes", ","),
-    Column("held-out rooms: MAE ratio", "held_out/mae_ratio", ".2f"),
-    Column("MedAE ratio", "held_out/medae_ratio", ".2f"),
+STAGES = [
+    *columns("", {"stage": "stage", "starts_from": "starts from", "maps": "maps"}),
+    *columns(",", {"num_rooms": "rooms", "num_views": "views", "steps": "steps"}),
+    *columns("", {"batch": "batch and crop, px"}),
+    *columns("g", {"learning_rate": "learning rate"}),
+    *columns(",", {"minutes": "minutes"}),
+    *columns(".2f", {"held_out/mae_ratio": "held-out rooms: MAE ratio"}),
+    *columns(".2f", {"held_out/medae_ratio": "MedAE ratio"}),
     Column("weights", lambda row: f"`{short_hash(row['weights_sha256'])}`"),
-)
+]
 
 
 def short_hash(sha256: str) -> str:
@@ -59,8 +55,7 @@ def weights_text(measured: Measured) -> str:
         "outputs": "; ".join(outputs),
         "normalisation": f"{network['normalisation']}, tile by tile",
     }
-    columns = (Column("", itemgetter(0)), Column("", itemgetter(1)))
-    return table(columns, facts.items())
+    return table([Column("", itemgetter(index)) for index in (0, 1)], facts.items())
 
 
 def training_text(measured: Measured) -> str:

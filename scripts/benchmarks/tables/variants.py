@@ -3,19 +3,18 @@
 from collections.abc import Iterator
 from typing import Any
 
-from resdepth_colmap.evaluation.markdown import Column, Measured, grouped
+from resdepth_colmap.evaluation.markdown import Measured, columns, grouped
 
-COLUMNS = (
-    Column("network", "label"),
+COLUMNS = [
+    *columns("", {"label": "network"}),
     *grouped(
         {"rendered": "held-out rooms", "middlebury": "Middlebury"},
-        (
-            Column("MAE ratio", "mae_ratio", ".2f"),
-            Column("MedAE ratio", "medae_ratio", ".2f"),
-            Column("off by > 2 %", "bad_2", ".1%"),
-        ),
+        [
+            *columns(".2f", {"mae_ratio": "MAE ratio", "medae_ratio": "MedAE ratio"}),
+            *columns(".1%", {"bad_2": "off by > 2 %"}),
+        ],
     ),
-)
+]
 PAPER = {
     "unfiltered": "unfiltered PatchMatch",
     "median": "5 x 5 median",
