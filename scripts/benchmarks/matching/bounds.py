@@ -1,4 +1,4 @@
-"""Lower bounds of the matcher's run time: its arithmetic, and the memory it streams.
+"""What the matcher cannot be faster than: its arithmetic, and the memory it streams.
 
 The arithmetic is that of the window costs that a run computes, at the speed that they
 have while all data stay in the nearest cache.
@@ -25,7 +25,7 @@ _NUM_REPEATS = 3
 
 
 class CountedSources(NamedTuple):
-    """`matching.cost.Sources`, and the number of window costs computed in them."""
+    """`matching.cost.Sources`, and how often a plane was looked at in one of them."""
 
     A: npt.NDArray[np.float32]
     b: npt.NDArray[np.float32]
@@ -66,7 +66,7 @@ def count_evaluations(
     def counted(levels, K, planes, costs, sources, *rest):
         kernel(levels, K, planes, costs, CountedSources(*sources, count), *rest)
 
-    # The matcher takes its kernel from the module at each call.
+    # The matcher looks its kernel up in the module at each call.
     setattr(sweeps, "sweep", counted)  # noqa: B010 (mypy wants a kernel there)
     try:
         patch_match.match_view(views[0], views[1:], depth_range, config)
@@ -124,11 +124,11 @@ def seconds_in_cache(config: StereoConfig) -> tuple[float, float]:
     weights = np.empty(len(window.dx), np.float32)
     values = np.empty(len(window.dx), np.float32)
 
-    def costs(num_calls):
-        _repeated_costs(levels, flat, window, weights, values, num_calls)
+    def costs(number):
+        _repeated_costs(levels, flat, window, weights, values, number)
 
-    def windows(num_calls):
-        _repeated_windows(levels, window, weights, values, num_calls)
+    def windows(number):
+        _repeated_windows(levels, window, weights, values, number)
 
     return _seconds_a_call(costs), _seconds_a_call(windows)
 
