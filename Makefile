@@ -45,19 +45,29 @@ fix: $(READY)  ## what a tool can mend
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-bench: $(READY)  ## measure what docs/benchmarks.md reports
-	$(BIN)/python -m scripts.benchmarks.matching.quality
-	$(BIN)/python -m scripts.benchmarks.matching.stereo_memory
-	$(BIN)/python -m scripts.benchmarks.middlebury
-	$(BIN)/python -m scripts.benchmarks.middlebury --without-network
-	$(BIN)/python -m scripts.benchmarks.held_out
-	$(BIN)/python -m scripts.benchmarks.agreement
-	$(BIN)/python -m scripts.benchmarks.refine
-	$(BIN)/python -m scripts.benchmarks.workspaces
-	$(BIN)/python -m scripts.benchmarks.compare
-	$(BIN)/python -m scripts.benchmarks.cloud
-	$(BIN)/python -m scripts.benchmarks.commands
-	$(BIN)/python -m scripts.benchmarks.make_tables
+RECORDS := docs/measurements
+BENCH := $(BIN)/python -m scripts.benchmarks
+
+bench: $(READY)  ## measure what docs/benchmarks.md reports; takes hours
+	$(BENCH).matching.quality
+	$(BENCH).matching.stereo_memory --views 12 100
+	$(BENCH).middlebury
+	$(BENCH).middlebury --without-network
+	$(BENCH).middlebury --rounds 1 --output $(RECORDS)/middlebury_rounds_1.json
+	$(BENCH).middlebury --passes 2 --output $(RECORDS)/middlebury_passes_2.json
+	$(BENCH).middlebury --no-update-gating --output $(RECORDS)/middlebury_no_update_gating.json
+	$(BENCH).middlebury --smoothness 0 --no-geom-consistency --output $(RECORDS)/middlebury_like_colmap.json
+	$(BENCH).held_out
+	$(BENCH).held_out --like-colmap
+	$(BENCH).held_out --rounds 1 --output $(RECORDS)/held_out_rounds_1.json
+	$(BENCH).held_out --rounds 2 --output $(RECORDS)/held_out_rounds_2.json
+	$(BENCH).agreement
+	$(BENCH).refine
+	$(BENCH).workspaces
+	$(BENCH).compare
+	$(BENCH).cloud
+	$(BENCH).commands
+	$(BENCH).make_tables
 
 clean:
 	rm -rf $(VENV) demo

@@ -1,6 +1,7 @@
-"""What a run ran on: versions, and the memory it took."""
+"""What a run ran on: versions, the machine, and the memory it took."""
 
 import importlib.metadata
+import os
 import platform
 import sys
 from pathlib import Path
@@ -21,6 +22,17 @@ def versions() -> dict[str, str]:
     return found
 
 
+def hardware() -> str:
+    """This machine, as "AMD EPYC 7B13, 2 cores, no GPU".
+
+    The cores are those that this process may use; the GPU is the one that PyTorch uses
+    by default. Imports torch, which takes seconds.
+    """
+    num_cores = _num_usable_cores()
+    cores = "1 core" if num_cores == 1 else f"{num_cores} cores"
+    return f"{_processor()}, {cores}, {_gpu() or 'no GPU'}"
+
+
 def peak_memory_mb() -> float | None:
     """Most memory that this process had at once, in MiB; None where unknown.
 
@@ -38,6 +50,30 @@ def peak_memory_mb() -> float | None:
         return None
     peak = float(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
     return peak / (1024**2 if sys.platform == "darwin" else 1024)
+
+
+def _processor() -> str:
+    cpuinfo = Path("/proc/cpuinfo")
+    if cpuinfo.exists():
+        for line in cpuinfo.read_text("utf-8", errors="replace").splitlines():
+            key, _, value = line.partition(":")
+            if key.strip() == "model name":
+                return value.strip()
+    return platform.processor() or platform.machine()
+
+
+def _num_usable_cores() -> int:
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _gpu() -> str | None:
+    import torch  # slow, and not needed for the rest
+
+    if torch.cuda.is_available():
+        return torch.cuda.get_device_name()
+    return "Apple GPU" if torch.backends.mps.is_available() else None
 
 
 def _version(package: str) -> str:

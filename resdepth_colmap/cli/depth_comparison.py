@@ -15,7 +15,7 @@ from resdepth_colmap.evaluation.datasets.paper import PAPER_MAX_RESIDUAL
 if TYPE_CHECKING:
     from resdepth_colmap.evaluation.datasets.sample import SceneSource
     from resdepth_colmap.evaluation.depth.evaluation import EvaluationOptions
-    from resdepth_colmap.evaluation.depth.tables import Measured
+    from resdepth_colmap.evaluation.markdown import Measured
 
 NO_MATCHER_OPTIONS = (
     "max_image_size",

@@ -1,17 +1,12 @@
-"""Measure whether refining COLMAP's unfiltered maps leads towards its filtered ones.
+"""Measure how near COLMAP's unfiltered maps are to its filtered ones, and ours to them.
 
     python -m scripts.benchmarks.agreement
 
 Refines a copy of the workspace plant/ of RESDEPTH_DATA from its photometric maps, which
-are whole, and compares maps before and after with COLMAP's geometric ones where their
-filter has left a depth. The figures go to docs/measurements/agreement.json; then
-`python -m scripts.benchmarks.make_tables` puts them into the documents.
+have no holes, and compares the maps before and after with COLMAP's geometric ones where
+its filter has left a depth. Writes docs/measurements/agreement.json.
 """
 
-import argparse
-import datetime
-import json
-import os
 import shutil
 import tempfile
 from pathlib import Path
@@ -25,18 +20,22 @@ from resdepth_colmap.io.colmap.workspace import open_workspace
 from resdepth_colmap.network.weights import weights_hash
 from resdepth_colmap.pipeline.refine.stage import refine_workspace
 from resdepth_colmap.scene import DepthMap
+from scripts.benchmarks.record import parser, rounded, stamp, write
 
-REPOSITORY = Path(__file__).resolve().parents[2]
-RESULT = REPOSITORY / "docs" / "measurements" / "agreement.json"
 LIMITS = {"within_1": 0.01, "within_2": 0.02, "within_5": 0.05}
 UNFILTERED, FILTERED = "photometric", "geometric"
 
 
 def agreement(depth: DepthMap, expected: DepthMap) -> dict[str, float]:
-    """The share of the expected depths that a map has, within each limit."""
+    """Shares of the expected depths that a map has, within each limit.
+
+    Args:
+        depth: Shape (H, W), in units; 0 = no depth.
+        expected: Likewise; where it is 0 no pixel counts.
+    """
     known = expected > 0
     change = np.abs(depth - expected)[known] / expected[known]
-    return {name: round(float(np.mean(change < LIMITS[name])), 4) for name in LIMITS}
+    return {name: float(np.mean(change < limit)) for name, limit in LIMITS.items()}
 
 
 def measure(path: Path, weights: Path | None) -> dict[str, Any]:
@@ -50,7 +49,7 @@ def measure(path: Path, weights: Path | None) -> dict[str, Any]:
         before = read_depth_map(workspace.depth_map_path(name, UNFILTERED))
         after = read_depth_map(report.output.depth_map_path(name))
         images[name] = {
-            "known": round(float(np.mean(expected > 0)), 4),
+            "known": float(np.mean(expected > 0)),
             "unfiltered": agreement(before, expected),
             "refined": agreement(after, expected),
         }
@@ -59,27 +58,23 @@ def measure(path: Path, weights: Path | None) -> dict[str, Any]:
 
 def main() -> None:
     """Read the command line, measure and write."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    default = REPOSITORY.parent / "shared" / "data"
-    data = Path(os.environ.get("RESDEPTH_DATA", default))
-    parser.add_argument("--workspace", type=Path, default=data / "plant")
-    parser.add_argument("--weights", type=Path, help="others than the shipped ones")
-    parser.add_argument("--output", type=Path, default=RESULT)
-    arguments = parser.parse_args()
+    options = parser(__doc__, "agreement")
+    options.add_argument("--weights", type=Path, help="others than the shipped ones")
+    arguments = options.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / "plant"
         shutil.copytree(
-            arguments.workspace, copy, copy_function=lambda a, b: Path(b).symlink_to(a)
+            arguments.data / "plant",
+            copy,
+            copy_function=lambda source, target: Path(target).symlink_to(source),
         )
         images = measure(copy, arguments.weights)
     measured = {
-        "command": "python -m scripts.benchmarks.agreement",
-        "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
+        **stamp("agreement"),
         "weights_sha256": weights_hash(arguments.weights),
-        "images": images,
+        "images": rounded(images, 4),
     }
-    arguments.output.write_text(json.dumps(measured, indent=2) + "\n", "utf-8")
-    print(json.dumps(measured, indent=2))
+    write(arguments.output, measured)
 
 
 if __name__ == "__main__":

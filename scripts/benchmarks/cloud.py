@@ -2,17 +2,14 @@
 
     python -m scripts.benchmarks.cloud [--data FOLDER]
 
-Parity: the cases of eth3d_cloud_cases in the folder of the real data, each with what
-the official program printed. Speed: a furnished room, scanned from its middle at equal
-angles; the cloud is what is seen from a corner, with noise of 1 cm and 2 % of floaters.
-Each size runs in a process of its own. The figures go to docs/measurements/cloud.json.
+Parity: the samples of eth3d_cloud_cases/ in the real data, each with the output of the
+official program. Speed: a furnished room, scanned from its middle at equal angles; the
+cloud is what is seen from a corner, with noise of 1 cm and 2 % of floaters. Each size
+runs in a separate process. Writes docs/measurements/cloud.json.
 """
 
-import argparse
-import datetime
 import json
 import multiprocessing
-import os
 import tempfile
 import time
 from pathlib import Path
@@ -24,12 +21,10 @@ import numpy.typing as npt
 from resdepth_colmap.evaluation.cloud.config import CloudConfig
 from resdepth_colmap.evaluation.cloud.files import score_cloud_file
 from resdepth_colmap.io.point_cloud import PointCloud, write_cloud
-from resdepth_colmap.versions import peak_memory_mb, versions
-from scripts.benchmarks.tables.cloud import SCORES, cloud_table
+from resdepth_colmap.versions import peak_memory_mb
+from scripts.benchmarks.record import parser, rounded, stamp, write
+from scripts.benchmarks.tables.costs import SCORES
 
-REPOSITORY = Path(__file__).resolve().parents[2]
-RESULT = REPOSITORY / "docs" / "measurements" / "cloud.json"
-DATA = Path(os.environ.get("RESDEPTH_DATA", REPOSITORY.parent / "shared" / "data"))
 SIZES = (250_000, 1_000_000, 4_000_000)
 NOISE_M = 0.01
 SHARE_OF_FLOATERS = 0.02
@@ -109,19 +104,19 @@ def measure(folder: Path) -> dict[str, Any]:
 
 
 def measured_alone(folder: Path) -> dict[str, Any]:
-    """The same in a process of its own, whose memory is its own."""
+    """The same in a new process, whose peak memory counts nothing else."""
     with multiprocessing.get_context("spawn").Pool(1) as pool:
         return pool.apply(measure, (folder,))
 
 
 def compared(folder: Path) -> dict[str, Any]:
-    """Our scores of a case beside the official ones."""
+    """Our scores of a sample beside the official ones."""
     official = json.loads((folder / "official.json").read_text("utf-8"))
     ours = measure(folder)["scores"]
     return {
         "tolerances": official["tolerances"],
         "official": {name: official[name] for name in SCORES},
-        "ours": {name: [round(v, 6) for v in ours[name]] for name in SCORES},
+        "ours": {name: rounded(list(ours[name])) for name in SCORES},
     }
 
 
@@ -135,22 +130,15 @@ def timed(num_points: int) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Read the command line, compare, measure, print and write."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--data", type=Path, default=DATA, help="the real data")
-    parser.add_argument("--output", type=Path, default=RESULT)
-    arguments = parser.parse_args()
+    """Read the command line, compare, measure and write."""
+    arguments = parser(__doc__, "cloud").parse_args()
     samples = sorted((arguments.data / "eth3d_cloud_cases").iterdir())
     measured = {
-        "command": "python -m scripts.benchmarks.cloud",
-        "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
-        "versions": versions(),
+        **stamp("cloud"),
         "samples": {folder.name: compared(folder) for folder in samples},
         "sizes": [timed(num_points) for num_points in SIZES],
     }
-    arguments.output.parent.mkdir(parents=True, exist_ok=True)
-    arguments.output.write_text(json.dumps(measured, indent=2) + "\n", "utf-8")
-    print(cloud_table(measured))
+    write(arguments.output, measured)
 
 
 if __name__ == "__main__":

@@ -1,48 +1,47 @@
 """Measure matcher and network on the two-view scenes of Middlebury.
 
-    python -m scripts.benchmarks.middlebury [OPTIONS OF
-        `resdepth-colmap evaluate depth`]
+    python -m scripts.benchmarks.middlebury [OPTIONS OF `evaluate depth`]
     python -m scripts.benchmarks.middlebury --without-network
 
-It is that command on the folder middlebury/ of RESDEPTH_DATA, and writes the figures to
-docs/measurements/middlebury.json unless --output names another file; then
-`python -m scripts.benchmarks.make_tables` puts them into the documents. The second form
-takes a network that changes nothing, so that what remains is what the map of the
-second view does to the first one's; its figures go to middlebury_completed.json.
+Runs `resdepth-colmap evaluate depth` on middlebury/ of RESDEPTH_DATA and writes
+docs/measurements/middlebury.json unless --output names another file. The second form
+uses a network that changes nothing: what remains is the completion of depth without
+consistent views. It writes docs/measurements/middlebury_without_network.json.
 """
 
-import os
 import sys
 import tempfile
 from pathlib import Path
 
-from resdepth_colmap.cli.main import main
-from resdepth_colmap.network.network_config import NetworkConfig
-from resdepth_colmap.network.unet import ResDepthNet
-from resdepth_colmap.network.weights import save_weights
+from scripts.benchmarks.program import evaluate_depth
+from scripts.benchmarks.record import DATA
 
-REPOSITORY = Path(__file__).resolve().parents[2]
-MEASUREMENTS = REPOSITORY / "docs" / "measurements"
 WITHOUT_NETWORK = "--without-network"
 
 
-def run() -> None:
+def main() -> None:
     """Run the command; the last --output wins."""
-    default = REPOSITORY.parent / "shared" / "data"
-    scenes = Path(os.environ.get("RESDEPTH_DATA", default)) / "middlebury"
+    scenes = DATA / "middlebury"
     options = [option for option in sys.argv[1:] if option != WITHOUT_NETWORK]
-    name = "middlebury"
+    if WITHOUT_NETWORK not in sys.argv:
+        evaluate_depth(scenes, "middlebury", options)
+        return
     with tempfile.TemporaryDirectory() as folder:
-        if len(options) < len(sys.argv) - 1:
-            name = "middlebury_completed"
-            weights = Path(folder) / "unchanging.safetensors"
-            unchanging = NetworkConfig(base_channels=1, propagation_channels=0)
-            save_weights(weights, ResDepthNet(unchanging))
-            options = ["--weights", str(weights), "--rounds", "1", *options]
-        command = ["evaluate", "depth", str(scenes)]
-        command += ["--output", str(MEASUREMENTS / f"{name}.json"), *options]
-        main(command, prog_name="resdepth-colmap")
+        weights = Path(folder) / "unchanging.safetensors"
+        write_unchanging_network(weights)
+        given = ["--weights", str(weights), "--rounds", "1"]
+        evaluate_depth(scenes, "middlebury_without_network", [*given, *options])
+
+
+def write_unchanging_network(path: Path) -> None:
+    """Write weights of a small network whose residual is 0."""
+    from resdepth_colmap.network.network_config import NetworkConfig
+    from resdepth_colmap.network.unet import ResDepthNet
+    from resdepth_colmap.network.weights import save_weights
+
+    config = NetworkConfig(base_channels=1, propagation_channels=0)
+    save_weights(path, ResDepthNet(config))
 
 
 if __name__ == "__main__":
-    run()
+    main()

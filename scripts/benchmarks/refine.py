@@ -2,14 +2,10 @@
 
     python -m scripts.benchmarks.refine [--weights FILE] [--passes 2]
 
-Random texture and random depth: the time depends on neither. Writes the figures to
-docs/measurements/refine.json; then
-`python -m scripts.benchmarks.make_tables` puts them into the documents.
+Random texture and random depth: the time depends on neither. Writes
+docs/measurements/refine.json.
 """
 
-import argparse
-import datetime
-import json
 import statistics
 import time
 from pathlib import Path
@@ -23,18 +19,15 @@ from resdepth_colmap.network.inference import for_inference
 from resdepth_colmap.network.unet import ResDepthNet
 from resdepth_colmap.network.weights import load_weights, weights_hash
 from resdepth_colmap.pipeline.refine.view import SourceView, ViewInputs, refine_view
-from resdepth_colmap.versions import versions
-from scripts.benchmarks.tables.documents import refine_table
+from scripts.benchmarks.record import parser, stamp, write
 
-REPOSITORY = Path(__file__).resolve().parents[2]
-RESULT = REPOSITORY / "docs" / "measurements" / "refine.json"
 SIZES_PX = ((704, 496), (1632, 1224))  # 0.35 and 2 megapixels
 NUM_REPETITIONS = 3
 NUM_THREADS = 2
 
 
 def random_view(width_px: int, height_px: int) -> ViewInputs:
-    """A view with one source aside, of random texture and depth."""
+    """A view with one source beside it, of random texture and depth."""
     rng = np.random.default_rng(0)
     images = rng.random((2, height_px, width_px), dtype=np.float32)
     depth = (2 + 2 * rng.random((height_px, width_px))).astype(np.float32)
@@ -62,38 +55,33 @@ def measure(
         "height_px": height_px,
         "megapixels": round(megapixels, 3),
         "seconds": seconds[1:],
-        "s_per_mp_and_pass": round(median_s / megapixels / config.inner_iterations, 3),
+        "s_per_mp_and_inner_iteration": round(
+            median_s / megapixels / config.inner_iterations, 3
+        ),
     }
 
 
 def main() -> None:
-    """Read the command line, measure size by size, print and write."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--weights", type=Path)
-    parser.add_argument("--passes", type=int, default=RefineConfig.inner_iterations)
-    parser.add_argument("--output", type=Path, default=RESULT)
-    arguments = parser.parse_args()
+    """Read the command line, measure size by size and write."""
+    options = parser(__doc__, "refine", reads_data=False)
+    options.add_argument("--weights", type=Path)
+    options.add_argument("--passes", type=int, default=RefineConfig.inner_iterations)
+    arguments = options.parse_args()
     torch.set_num_threads(NUM_THREADS)
     config = RefineConfig(inner_iterations=arguments.passes, weights=arguments.weights)
     network = for_inference(load_weights(config.weights))
+    is_default = config.inner_iterations == RefineConfig.inner_iterations
+    command = "refine" if is_default else f"refine --passes {config.inner_iterations}"
     measured = {
-        "command": "python -m scripts.benchmarks.refine",
-        "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
+        **stamp(command),
         "weights_sha256": weights_hash(config.weights),
         "options": {
             "inner_iterations": config.inner_iterations,
             "threads": NUM_THREADS,
         },
-        "versions": versions(),
         "sizes": [measure(*size, network, config) for size in SIZES_PX],
     }
-    if config.inner_iterations != RefineConfig.inner_iterations:
-        measured["command"] = (
-            f"{measured['command']} --passes {config.inner_iterations}"
-        )
-    arguments.output.parent.mkdir(parents=True, exist_ok=True)
-    arguments.output.write_text(json.dumps(measured, indent=2) + "\n", "utf-8")
-    print(refine_table(measured))
+    write(arguments.output, measured)
 
 
 if __name__ == "__main__":

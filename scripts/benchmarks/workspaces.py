@@ -1,27 +1,21 @@
-"""Run `resdepth-colmap refine` on the real workspaces, as a user would, and keep score.
+"""Run `resdepth-colmap refine` on the real workspaces, as a user does.
 
-    python -m scripts.benchmarks.workspaces --output /somewhere
-        [--only plant-geometric ...]
+    python -m scripts.benchmarks.workspaces [--work FOLDER] [--only plant-geometric ...]
 
-Each run starts from a fresh copy below --output (links where possible), where its
-pictures and cloud can be looked at afterwards. `castle_photos` starts from the photos:
-structure from motion and undistortion by pycolmap first. The figures go to
-docs/measurements/workspaces.json.
+Each run starts from a fresh copy below --work, where its pictures and cloud stay.
+`castle_photos` starts from the photos: structure from motion and undistortion by
+pycolmap first. Writes docs/measurements/workspaces.json after each workspace.
 """
 
-import argparse
-import datetime
 import json
-import os
 import shutil
-import subprocess
-import sys
 import time
 from pathlib import Path
 from typing import Any
 
-REPOSITORY = Path(__file__).resolve().parents[2]
-RESULT = REPOSITORY / "docs" / "measurements" / "workspaces.json"
+from scripts.benchmarks.program import run
+from scripts.benchmarks.record import BUILD, hardware, parser, read, stamp, today, write
+
 SAMPLES: dict[str, tuple[str, list[str]]] = {
     "meeting_room": ("meeting_room", []),
     "plant-photometric": ("plant", ["--input", "photometric"]),
@@ -48,9 +42,9 @@ def reconstruct(photos: Path, workspace: Path) -> float:
     return time.perf_counter() - start
 
 
-def prepare(sample: str, data: Path, output: Path) -> tuple[Path, float]:
+def prepare(sample: str, data: Path, work: Path) -> tuple[Path, float]:
     """A fresh copy of the workspace, and the seconds of structure from motion."""
-    source, target = data / SAMPLES[sample][0], output / sample
+    source, target = data / SAMPLES[sample][0], work / sample
     shutil.rmtree(target, ignore_errors=True)
     if (source / "sparse").is_dir():
         shutil.copytree(source, target)
@@ -59,29 +53,25 @@ def prepare(sample: str, data: Path, output: Path) -> tuple[Path, float]:
 
 
 def measure(
-    sample: str, data: Path, output: Path, before: dict[str, Any] | None
+    sample: str, data: Path, work: Path, before: dict[str, Any] | None
 ) -> dict[str, Any]:
-    """Run the command on the case and collect what its record says.
+    """Run the command on a workspace and collect the figures of its run.json.
 
     Args:
-        sample: Which one.
+        sample: Name of the workspace and its options.
         data: Folder of the real data.
-        output: Folder of the copies.
-        before: Figures of an earlier run, whose copy is there: its matched maps and
-            their seconds are kept, the rest is done again. None = all is done.
+        work: Folder of the copies.
+        before: Figures of an earlier run whose copy exists: its matched maps and their
+            seconds are kept, the rest is done again. None = all is done.
     """
-    extra = []
+    options, extra = SAMPLES[sample][1], []
     if before is None:
-        workspace, sfm_s = prepare(sample, data, output)
+        workspace, sfm_s = prepare(sample, data, work)
     else:
-        workspace = output / sample / ("dense" if "castle" in sample else "")
+        workspace = work / sample / ("dense" if "castle" in sample else "")
         sfm_s = before["seconds"]["structure_from_motion"]
         extra = ["--overwrite"]
-    program = Path(sys.executable).parent / "resdepth-colmap"
-    command = [str(program), "refine", str(workspace)]
-    start = time.perf_counter()
-    subprocess.run([*command, *SAMPLES[sample][1], *extra], check=True)
-    wall_s = time.perf_counter() - start
+    wall_s = run("refine", workspace, *options, *extra)["seconds"]
     record = json.loads((workspace / "resdepth" / "run.json").read_text("utf-8"))
     images = record["images"].values()
     if before is not None:
@@ -89,8 +79,9 @@ def measure(
         wall_s += kept_s - record["seconds"]["stereo"]
         record["seconds"]["stereo"] = kept_s
     return {
-        "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
-        "options": SAMPLES[sample][1],
+        "date": today(),
+        "hardware": hardware(),
+        "options": options,
         "num_images": len(images),
         "seconds": {"structure_from_motion": round(sfm_s, 1), **record["seconds"]},
         "seconds_in_all": round(wall_s, 1),
@@ -107,27 +98,19 @@ def _mean(values: list[float]) -> float:
 
 
 def main() -> None:
-    """Read the command line and measure case by case."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    default = REPOSITORY.parent / "shared" / "data"
-    parser.add_argument(
-        "--data", type=Path, default=os.environ.get("RESDEPTH_DATA", default)
+    """Read the command line, measure and write workspace by workspace."""
+    options = parser(__doc__, "workspaces")
+    options.add_argument("--work", type=Path, default=BUILD / "workspaces")
+    options.add_argument("--only", nargs="*", choices=SAMPLES, default=list(SAMPLES))
+    options.add_argument(
+        "--keep-maps", action="store_true", help="keep the maps matched earlier"
     )
-    parser.add_argument("--output", type=Path, default=REPOSITORY / "build" / "bench")
-    parser.add_argument("--only", nargs="*", choices=SAMPLES, default=list(SAMPLES))
-    parser.add_argument(
-        "--keep-maps", action="store_true", help="match nothing again; see measure()"
-    )
-    arguments = parser.parse_args()
+    arguments = options.parse_args()
     for sample in arguments.only:
-        results = json.loads(RESULT.read_text("utf-8")) if RESULT.exists() else {}
+        results = read(arguments.output).get("workspaces", {})
         before = results[sample] if arguments.keep_maps else None
-        results[sample] = measure(
-            sample, Path(arguments.data), arguments.output, before
-        )
-        RESULT.parent.mkdir(parents=True, exist_ok=True)
-        RESULT.write_text(json.dumps(results, indent=2) + "\n", "utf-8")
-        print(sample, json.dumps(results[sample]))
+        results[sample] = measure(sample, arguments.data, arguments.work, before)
+        write(arguments.output, {**stamp("workspaces"), "workspaces": results})
 
 
 if __name__ == "__main__":

@@ -1,21 +1,47 @@
-"""What `evaluate eth3d` found: the shape of the paper's table, and more detail."""
+"""The tables that `evaluate eth3d` prints: that of the paper, and more detail."""
 
-from resdepth_colmap.evaluation.datasets.paper import (
-    PAPER_OVERALL,
-    PAPER_ROWS,
-    PaperRow,
-)
+from typing import Any
+
+from resdepth_colmap.evaluation.datasets.paper import PAPER_OVERALL, PAPER_ROWS
 from resdepth_colmap.evaluation.depth.tables import (
-    DEPTHS,
+    NAMES,
+    NO_SCENE,
     OVERALL,
-    Measured,
+    PIXELS,
+    REGION_ERRORS,
+    discarded,
+    error_rows,
     origins,
-    parts_table,
-    residuals_said,
-    result_rows,
 )
-from resdepth_colmap.evaluation.markdown import count, markdown_table, number, percent
+from resdepth_colmap.evaluation.markdown import Measured, columns, table
 
+SCORES = {
+    "refined/mae": "refined: MAE",
+    "refined/rmse": "RMSE",
+    "unfiltered/mae": "unfiltered: MAE",
+    "unfiltered/rmse": "RMSE",
+}
+PUBLISHED = {
+    "paper/refined_mae": "ResDepth-stereo: MAE",
+    "paper/refined_rmse": "RMSE",
+    "paper/unfiltered_mae": "COLMAP (unfilt.): MAE",
+    "paper/unfiltered_rmse": "RMSE",
+}
+PAPER = [
+    *columns("", {"scene": "scene"}),
+    *columns(",", {"num_views": "pairs"}),
+    *columns(".2f", SCORES),
+    *columns(",", {"paper/num_pairs": "paper: pairs"}),
+    *columns(".2f", PUBLISHED),
+]
+ERRORS = [
+    *NAMES,
+    *columns(".3f", {"mae": "MAE, m", "rmse": "RMSE, m", "medae": "MedAE, m"}),
+    *columns(
+        ".1%", {"bad_1cm": "off by > 1 cm", "bad_2cm": "> 2 cm", "bad_5cm": "> 5 cm"}
+    ),
+    *PIXELS,
+]
 _CAVEAT = (
     "The paper's figures are those of its table, not measured here: of other pairs, "
     "picked by hand, refined by a network that was trained on ETH3D."
@@ -28,71 +54,34 @@ def eth3d_table(measured: Measured) -> str:
     Args:
         measured: `DepthReport.to_mapping()` with a "protocol".
     """
-    protocol = measured["protocol"]
-    said = (
-        f"Images {protocol['image_width_px']} px wide, pairs {protocol['pairs']}; "
-        f"{residuals_said(measured, 'm')}; "
-        f"weights `{measured['weights_sha256'][:12]}`."
-    )
     if not measured["scenes"]:
-        return "No scene could be compared."
-    tables = [paper_table(measured), errors_table(measured), parts_table(measured)]
-    return "\n\n".join([said, origins(measured), *tables, _CAVEAT])
+        return NO_SCENE
+    protocol = measured["protocol"]
+    return "\n\n".join(
+        [
+            f"Images {protocol['image_width_px']} px wide, pairs {protocol['pairs']}; "
+            f"{discarded(measured, 'm')}; "
+            f"weights `{measured['weights_sha256'][:12]}`.",
+            origins(measured),
+            table(PAPER, paper_rows(measured)),
+            table(ERRORS, error_rows(measured)),
+            table(REGION_ERRORS, error_rows(measured)),
+            _CAVEAT,
+        ]
+    )
 
 
-def paper_table(measured: Measured) -> str:
-    """The paper's table: its scenes in its order, then others; errors in metres."""
+def paper_rows(measured: Measured) -> list[dict[str, Any]]:
+    """The scenes of the paper in its order, then others, then all pixels."""
     scenes = measured["scenes"]
-    names = [*PAPER_ROWS, *(name for name in scenes if name not in PAPER_ROWS)]
-    rows = [_paper_row(name, scenes.get(name), PAPER_ROWS.get(name)) for name in names]
+    rows = [
+        {"scene": name, **scenes.get(name, {}), "paper": _published(name)}
+        for name in dict.fromkeys([*PAPER_ROWS, *scenes])
+    ]
     num_pairs = sum(scene["num_views"] for scene in scenes.values())
     overall = {**measured["overall"], "num_views": num_pairs}
-    return markdown_table(
-        "scene | pairs | refined: MAE | RMSE | unfiltered: MAE | RMSE | "
-        "paper: pairs | ResDepth-stereo: MAE | RMSE | COLMAP (unfilt.): MAE | RMSE",
-        [*rows, _paper_row(OVERALL, overall, PAPER_OVERALL)],
-    )
+    return [*rows, {"scene": OVERALL, **overall, "paper": PAPER_OVERALL._asdict()}]
 
 
-def errors_table(measured: Measured) -> str:
-    """Every depth of every scene: errors in metres, shares off by centimetres."""
-    rows = [
-        [name, label, *_error_cells(errors[method])]
-        for name, errors in result_rows(measured)
-        for method, label in DEPTHS.items()
-    ]
-    return markdown_table(
-        "scene | depth | MAE, m | RMSE, m | MedAE, m | off by > 1 cm | > 2 cm | "
-        "> 5 cm | valid pixels | of",
-        rows,
-        num_texts=2,
-    )
-
-
-def _paper_row(name: str, scene: Measured | None, paper: PaperRow | None) -> list[str]:
-    measured: list[float | None] = [None] * 4
-    if scene is not None:
-        measured = [
-            scene[method][error]
-            for method in ("refined", "unfiltered")
-            for error in ("mae", "rmse")
-        ]
-    published: list[float | None] = [None] * 4
-    if paper is not None:
-        published = list(paper[1:])
-    return [
-        name,
-        count(scene["num_views"] if scene else None),
-        *[number(value, digits=2) for value in measured],
-        count(paper.num_pairs if paper else None),
-        *[number(value, digits=2) for value in published],
-    ]
-
-
-def _error_cells(errors: Measured) -> list[str]:
-    return [
-        *[number(errors[name]) for name in ("mae", "rmse", "medae")],
-        *[percent(errors[name]) for name in ("bad_1cm", "bad_2cm", "bad_5cm")],
-        count(errors["num_valid"]),
-        count(errors["num_pixels"]),
-    ]
+def _published(name: str) -> dict[str, Any] | None:
+    return PAPER_ROWS[name]._asdict() if name in PAPER_ROWS else None

@@ -28,7 +28,7 @@ from resdepth_colmap.network.unet import ResDepthNet
 from resdepth_colmap.network.weights import load_weights, weights_hash
 from resdepth_colmap.pipeline.refine.view import SourceView, ViewInputs, refine_view
 from resdepth_colmap.progress import Progress, SilentProgress
-from resdepth_colmap.versions import versions
+from resdepth_colmap.versions import hardware, versions
 
 _WARM_UP_PX = 32
 
@@ -108,6 +108,7 @@ def evaluate_scenes(
         refine=options.refine,
         stereo=options.stereo,
         max_residual=options.max_residual,
+        hardware=hardware(),
         versions=versions(),
         scenes=tuple(results),
         failed=failed,

@@ -105,6 +105,7 @@ class DepthReport:
         refine: Options of the refinement.
         stereo: Options of the matcher.
         max_residual: Larger errors were discarded, in units; None = none was.
+        hardware: The machine that measured.
         versions: Of Python and the packages that matter.
         scenes: One result a scene.
         failed: What is wrong with each scene that could not be measured, by name.
@@ -115,6 +116,7 @@ class DepthReport:
     refine: RefineConfig
     stereo: StereoConfig
     max_residual: float | None
+    hardware: str
     versions: Mapping[str, str]
     scenes: tuple[SceneResult, ...]
     failed: Mapping[str, str]
@@ -138,6 +140,7 @@ class DepthReport:
                 "stereo": self.stereo.to_mapping(),
                 "max_residual": self.max_residual,
             },
+            "hardware": self.hardware,
             "versions": dict(self.versions),
             "scenes": {scene.name: scene.to_mapping() for scene in self.scenes},
             "overall": None if errors is None else plain_errors(errors),

@@ -1,21 +1,35 @@
-"""What `evaluate depth` found, as Markdown tables."""
+"""The tables that `evaluate depth` prints."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
 
-from resdepth_colmap.evaluation.markdown import (
-    count,
-    markdown_table,
-    number,
-    percent,
-)
-
-Measured = Mapping[str, Any]
-"""The JSON of a result, parsed."""
+from resdepth_colmap.evaluation.markdown import Measured, columns, grouped, table
 
 DEPTHS = {"unfiltered": "unfiltered", "median": "5 x 5 median", "refined": "refined"}
+"""The depth maps that are compared, and what tables call them."""
+
 OVERALL = "**overall**"
-_PARTS = {"edges": "edges", "flat": "flat areas"}
+NO_SCENE = "No scene could be compared."
+NAMES = columns("", {"scene": "scene", "depth": "depth"})
+PIXELS = columns(",", {"num_valid": "valid pixels", "num_pixels": "of"})
+ERRORS = [
+    *NAMES,
+    *columns(".4f", {"mae": "MAE", "rmse": "RMSE", "medae": "MedAE"}),
+    *columns(".1%", {"bad_1": "off by > 1 %", "bad_2": "off by > 2 %"}),
+    *PIXELS,
+]
+REGIONS = {"edges": "edges", "flat": "flat areas"}
+REGION_ERRORS = [
+    *NAMES,
+    *grouped(
+        REGIONS,
+        [
+            *columns(".4f", {"mae": "MAE", "medae": "MedAE"}),
+            *columns(".1%", {"bad_2": "off by > 2 %"}),
+            *columns(",", {"num_pixels": "pixels"}),
+        ],
+    ),
+]
 
 
 def depth_table(measured: Measured) -> str:
@@ -25,47 +39,35 @@ def depth_table(measured: Measured) -> str:
         measured: `DepthReport.to_mapping()`.
     """
     if not measured["scenes"]:
-        return "No scene could be compared."
+        return NO_SCENE
     return "\n\n".join(
         [
-            f"Errors in workspace units, {residuals_said(measured)}; "
+            f"Errors in workspace units, {discarded(measured)}; "
             f"weights `{measured['weights_sha256'][:12]}`.",
-            markdown_table(
-                "scene | depth | MAE | RMSE | MedAE | off by > 1 % | off by > 2 % | "
-                "valid pixels | of",
-                [
-                    [name, label, *_error_cells(errors[method])]
-                    for name, errors in result_rows(measured)
-                    for method, label in DEPTHS.items()
-                ],
-                num_texts=2,
-            ),
-            parts_table(measured),
+            table(ERRORS, error_rows(measured)),
+            table(REGION_ERRORS, error_rows(measured)),
             origins(measured),
         ]
     )
 
 
-def parts_table(measured: Measured) -> str:
-    """Errors at edges and in flat areas."""
-    header = "scene | depth" + "".join(
-        f" | MAE: {part} | MedAE: {part} | off by > 2 %: {part} | pixels: {part}"
-        for part in _PARTS.values()
-    )
-    rows = [
-        [
-            name,
-            label,
-            *(cell for part in _PARTS for cell in _part_cells(errors[part][method])),
-        ]
-        for name, errors in result_rows(measured)
-        for method, label in DEPTHS.items()
-    ]
-    return markdown_table(header, rows, num_texts=2)
+def error_rows(measured: Measured) -> Iterator[dict[str, Any]]:
+    """A row for each depth of each scene and, where there are several, of all pixels.
+
+    Yields:
+        Names of scene and depth, the errors, and those of each region.
+    """
+    scenes = dict(measured["scenes"])
+    if len(scenes) > 1:
+        scenes[OVERALL] = measured["overall"]
+    for scene, errors in scenes.items():
+        for method, label in DEPTHS.items():
+            regions = {region: errors[region][method] for region in REGIONS}
+            yield {"scene": scene, "depth": label, **errors[method], **regions}
 
 
-def residuals_said(measured: Measured, unit: str = "units") -> str:
-    """Which residuals were discarded, before means and medians were taken."""
+def discarded(measured: Measured, unit: str = "units") -> str:
+    """Which residuals are discarded before means and medians are taken."""
     limit = measured["options"]["max_residual"]
     if limit is None:
         return "no residual discarded"
@@ -73,7 +75,7 @@ def residuals_said(measured: Measured, unit: str = "units") -> str:
 
 
 def origins(measured: Measured) -> str:
-    """Whose the unfiltered depth is."""
+    """Where the unfiltered depth comes from."""
     scenes: dict[str, list[str]] = {}
     for name, scene in measured["scenes"].items():
         scenes.setdefault(", ".join(scene["initial"]), []).append(name)
@@ -81,31 +83,3 @@ def origins(measured: Measured) -> str:
         return f"Unfiltered depth: {next(iter(scenes))}."
     listed = "; ".join(f"{origin} ({', '.join(n)})" for origin, n in scenes.items())
     return f"Unfiltered depth: {listed}."
-
-
-def result_rows(measured: Measured) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    """The scenes and, where there are several, all pixels of all of them."""
-    yield from measured["scenes"].items()
-    if len(measured["scenes"]) > 1:
-        yield OVERALL, measured["overall"]
-
-
-def _error_cells(errors: Measured) -> list[str]:
-    return [
-        number(errors["mae"], digits=4),
-        number(errors["rmse"], digits=4),
-        number(errors["medae"], digits=4),
-        percent(errors["bad_1"]),
-        percent(errors["bad_2"]),
-        count(errors["num_valid"]),
-        count(errors["num_pixels"]),
-    ]
-
-
-def _part_cells(errors: Measured) -> list[str]:
-    return [
-        number(errors["mae"], digits=4),
-        number(errors["medae"], digits=4),
-        percent(errors["bad_2"]),
-        count(errors["num_pixels"]),
-    ]

@@ -1,6 +1,6 @@
-"""Workspaces that only the matcher's measurements write to, and what matching costs.
+"""Workspaces that only benchmarks write to, and the cost of matching.
 
-They share images, model and truth with a workspace that stays as it is, and are kept,
+They share images, model and truth with a workspace that stays unchanged, and are kept,
 so that finished maps are not made again.
 """
 
@@ -31,7 +31,7 @@ COSTS_NAME = "cpu_seconds.json"
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class MatchedWorkspace:
-    """A workspace of our own.
+    """A workspace that a benchmark matches.
 
     Attributes:
         path: Its folder.
@@ -50,19 +50,19 @@ class MatchedWorkspace:
         config: StereoConfig,
         progress: Progress | None = None,
     ) -> float | None:
-        """Make the maps that are not there yet.
+        """Make the maps that do not exist yet.
 
-        Compiling is not counted. A run that went on from an interrupted one tells the
+        Compiling is not counted. A run that resumes an interrupted one counts the
         seconds of the images that were left.
 
         Args:
-            label: What the seconds are kept under.
+            label: Key of the seconds in the file that keeps them.
             sources: The images to match, and their sources.
             config: Options of the matcher.
-            progress: Is told how far it is.
+            progress: Shows how far the matching is.
 
         Returns:
-            Processor seconds of all threads, a matched image; None if not known.
+            Processor seconds of all threads per matched image; None if not known.
 
         Raises:
             WorkspaceError: If an image cannot be matched.
@@ -92,7 +92,7 @@ def matched_workspace(original: Path, path: Path) -> MatchedWorkspace:
 
     Args:
         original: A dense workspace; nothing is written to it.
-        path: Where ours is, or will be.
+        path: Folder of the new one; made if it does not exist.
 
     Raises:
         WorkspaceError: If there is no workspace.
@@ -112,11 +112,11 @@ def matched_workspace(original: Path, path: Path) -> MatchedWorkspace:
 
 
 def linked_maps(original: Path, copy: MatchedWorkspace) -> bool:
-    """Link the depth maps of a workspace in one of ours.
+    """Link the depth maps of a workspace in a `MatchedWorkspace`.
 
     Args:
         original: A dense workspace; nothing is written to it.
-        copy: What `matched_workspace` made of it.
+        copy: The result of `matched_workspace`.
 
     Returns:
         Whether there are any.
@@ -132,7 +132,7 @@ def linked_maps(original: Path, copy: MatchedWorkspace) -> bool:
 
 
 def copied_maps(source: MatchedWorkspace, path: Path) -> MatchedWorkspace:
-    """Another workspace of the same images that begins with the same maps."""
+    """Another workspace of the same images that starts with a copy of the maps."""
     if not (path / "stereo").is_dir():
         partial = path / "partial"
         shutil.rmtree(partial, ignore_errors=True)

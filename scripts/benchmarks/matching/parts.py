@@ -1,6 +1,6 @@
 """The CPU PatchMatch on scenes: against COLMAP's maps, and against the truth.
 
-Maps are made by the stage `stereo`, with default options, in workspaces of their own.
+The stage `stereo` makes the maps with default options, in separate workspaces.
 """
 
 import dataclasses
@@ -46,7 +46,7 @@ FUSION = FuseConfig(min_num_views=5, max_normal_error_deg=10.0)
 
 
 def measure_plant(folders: Folders) -> Result:
-    """Against COLMAP's geometric maps, between our depths and between theirs."""
+    """Against COLMAP's geometric maps, with our depth range and with that of theirs."""
     colmap = open_workspace(folders.data / "plant")
     result = {}
     for label in ("own_range", "range_of_maps"):
@@ -104,7 +104,7 @@ def measure_middlebury(folders: Folders) -> Result:
 
 
 def measure_rendered(folders: Folders) -> Result:
-    """Six views against the exact truth: all maps, and what the filter leaves."""
+    """Six views against the exact truth: all maps, and the filtered ones."""
     return {
         name: measure_rendered_scene(folders, name)
         for name in ("rendered_rich", "rendered_weak")
@@ -112,7 +112,7 @@ def measure_rendered(folders: Folders) -> Result:
 
 
 def measure_rendered_scene(folders: Folders, name: str) -> Result:
-    """One of the scenes."""
+    """Maps of one rendered scene, their filtered versions, and the cloud of these."""
     matched = matched_workspace(folders.data / name, folders.cache / name)
     sources = {view.name: ALL for view in matched.scene.views}
     seconds = match_both(matched, sources)

@@ -1,6 +1,6 @@
-"""Maps of the CPU PatchMatch for its measurements, and how they are counted.
+"""Maps of the CPU PatchMatch for its measurements, and the means over them.
 
-They are made by the stage `stereo`, with default options, in workspaces of their own.
+The stage `stereo` makes them with default options, in separate workspaces.
 """
 
 import dataclasses
@@ -16,6 +16,7 @@ from resdepth_colmap.io.colmap.workspace import Workspace
 from resdepth_colmap.scene import DepthMap
 from scripts.benchmarks.matching.matched_workspace import MatchedWorkspace
 from scripts.benchmarks.matching.shares import mean_of
+from scripts.benchmarks.record import rounded
 
 logger = logging.getLogger(__name__)
 
@@ -36,7 +37,7 @@ class Folders:
 
     Attributes:
         data: The scenes.
-        cache: Workspaces of ours.
+        cache: The workspaces of `MatchedWorkspace`.
     """
 
     data: Path
@@ -68,25 +69,18 @@ def match_both(
     return seconds
 
 
-def rounded(value: Any) -> Any:
-    """The same with six digits behind the point, in all its parts."""
-    if isinstance(value, dict):
-        return {key: rounded(part) for key, part in value.items()}
-    return round(value, 6) if isinstance(value, float) else value
-
-
 def depth_of(workspace: Workspace, name: str, kind: str) -> DepthMap:
     """A depth map."""
     return read_depth_map(workspace.depth_map_path(name, kind))
 
 
 def mean_over(maps: Result, key: str) -> Result:
-    """Over the maps of which this was measured."""
+    """Means over the maps that have this."""
     return mean_of([entry[key] for entry in maps.values() if key in entry])
 
 
 def compared(maps: Result, seconds: Result) -> Result:
-    """Of each map what was measured, and the means."""
+    """The figures of each map, their means, and the processor seconds."""
     means = {
         kind: mean_over(maps, kind)
         for kind in KINDS

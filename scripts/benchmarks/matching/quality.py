@@ -1,73 +1,49 @@
-"""Measure how right the CPU PatchMatch is, and how fast.
+"""Measure how accurate and how fast the CPU PatchMatch is.
 
     python -m scripts.benchmarks.matching.quality [--only PART ...]
         [--cache FOLDER] [--data FOLDER]
 
-Parts: plant against COLMAP's own maps; middlebury and rendered against the truth; speed
-on noise. Maps are made by the stage `stereo` with default options, in workspaces of
-their own in the cache; finished ones are not made again while the matcher finds the
-same (its METHOD). One thread matches; processor seconds are told, which other jobs
-change little. Each part goes to docs/measurements/matching.json when it is done; then
-`python -m scripts.benchmarks.make_tables` puts the figures into the documents.
+Parts: plant against COLMAP's maps; middlebury and rendered against the truth; speed on
+noise. The stage `stereo` makes the maps with default options, in workspaces below
+--cache; maps that exist are kept until the method of the matcher changes (its METHOD).
+One thread matches, and processor seconds are counted, which other jobs change little.
+Writes docs/measurements/matching.json after each part.
 """
 
-import argparse
-import datetime
-import json
 import logging
-import os
 from pathlib import Path
 
 from resdepth_colmap.config import StereoConfig
 from resdepth_colmap.matching.patch_match import METHOD
-from resdepth_colmap.versions import versions
 from scripts.benchmarks.matching.parts import PARTS
-from scripts.benchmarks.matching.passes import Folders, rounded
-from scripts.benchmarks.tables.matching import matching_table
-
-REPOSITORY = Path(__file__).resolve().parents[3]
-RESULT = REPOSITORY / "docs" / "measurements" / "matching.json"
-DATA = Path(os.environ.get("RESDEPTH_DATA", REPOSITORY.parent / "shared" / "data"))
-CACHE = REPOSITORY / "build" / "matching"
+from scripts.benchmarks.matching.passes import Folders
+from scripts.benchmarks.record import BUILD, parser, read, rounded, stamp, today, write
 
 
 def main() -> None:
-    """Read the command line, measure, write and print."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--only", choices=PARTS, nargs="+", default=list(PARTS))
-    parser.add_argument("--data", type=Path, default=DATA, help="the real data")
-    parser.add_argument("--cache", type=Path, default=CACHE, help="maps are kept there")
-    parser.add_argument("--output", type=Path, default=RESULT)
-    arguments = parser.parse_args()
-    output: Path = arguments.output
+    """Read the command line, measure and write part by part."""
+    options = parser(__doc__, "matching")
+    options.add_argument("--only", choices=PARTS, nargs="+", default=list(PARTS))
+    options.add_argument(
+        "--cache", type=Path, default=BUILD / "matching", help="folder of the maps"
+    )
+    arguments = options.parse_args()
     logging.basicConfig(level=logging.INFO, format="%(message)s")
     import numba
 
     from resdepth_colmap.matching import sweeps  # noqa: F401 (the threading layer)
 
     numba.set_num_threads(1)
-    folders = Folders(
-        data=arguments.data,
-        cache=arguments.cache / f"method_{METHOD}",
-    )
+    folders = Folders(data=arguments.data, cache=arguments.cache / f"method_{METHOD}")
     for name in arguments.only:
-        measured = json.loads(output.read_text("utf-8")) if output.exists() else {}
+        measured = read(arguments.output)
         part = rounded(PARTS[name](folders))
         measured[name] = {"date": today(), "method": METHOD, **part}
         measured |= {
-            "command": "python -m scripts.benchmarks.matching.quality",
-            "date": today(),
-            "versions": versions(),
+            **stamp("matching.quality"),
             "options": StereoConfig().to_mapping(),
         }
-        output.parent.mkdir(parents=True, exist_ok=True)
-        output.write_text(json.dumps(measured, indent=2) + "\n", "utf-8")
-    print(matching_table(json.loads(output.read_text("utf-8"))))
-
-
-def today() -> str:
-    """The date, as documents have it."""
-    return datetime.datetime.now(datetime.UTC).date().isoformat()
+        write(arguments.output, measured)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""How near a depth map is to the depths that are expected of it."""
+"""Shares of pixels whose depth is near the expected one."""
 
 from collections.abc import Mapping, Sequence
 

@@ -1,4 +1,4 @@
-"""How fast the matcher is on noise, by size, sources and threads; what bounds it."""
+"""Speed of the matcher on noise, by size, sources and threads, and its bounds."""
 
 import os
 import time
@@ -57,7 +57,7 @@ def measured_speed() -> dict[str, Any]:
     result = {
         "num_iterations": CONFIG.num_iterations,
         "threads": _by_threads(base),
-        "sources": [_timed(BASE_MEGAPIXELS, number) for number in NUM_SOURCES],
+        "sources": [_timed(BASE_MEGAPIXELS, count) for count in NUM_SOURCES],
         "sizes": [_timed(size, 1) for size in MEGAPIXELS],
         "bounds": _bounds(base),
     }
@@ -86,30 +86,30 @@ def _seconds(views: list[MatchView]) -> tuple[float, float]:
 
 
 def _by_threads(views: list[MatchView]) -> list[dict[str, Any]]:
-    """One after the other, again and again, so that other jobs bother both alike."""
+    """Time each number of threads in turn, repeatedly: other jobs disturb all alike."""
     import numba
 
     found: dict[int, list[tuple[float, float]]] = {n: [] for n in NUM_THREADS}
     before = numba.get_num_threads()
     most = int(getattr(numba.config, "NUMBA_NUM_THREADS", 1))  # set at run time
-    possible = [number for number in NUM_THREADS if number <= most]
+    possible = [count for count in NUM_THREADS if count <= most]
     for _ in range(NUM_REPEATS):
-        for number in possible:
-            numba.set_num_threads(number)
-            found[number].append(_seconds(views))
+        for count in possible:
+            numba.set_num_threads(count)
+            found[count].append(_seconds(views))
     numba.set_num_threads(before)
     return [
         {
-            "threads": number,
-            "cpu_s": median(cpu for cpu, _ in found[number]),
-            "wall_s": median(wall for _, wall in found[number]),
+            "threads": count,
+            "cpu_s": median(cpu for cpu, _ in found[count]),
+            "wall_s": median(wall for _, wall in found[count]),
         }
-        for number in possible
+        for count in possible
     ]
 
 
 def _bounds(views: list[MatchView]) -> dict[str, Any]:
-    """The seconds that arithmetic and memory take by themselves, and ours."""
+    """The seconds that arithmetic and memory alone take, and those of the matcher."""
     from scripts.benchmarks.matching import bounds  # numba
 
     num_px, num_sources = views[0].gray.size, len(views) - 1

@@ -4,21 +4,18 @@
         [--size 1632 1224] [--views 12] [--skip-start]
 
 Views of noise in a row, six sources each, both passes, filtered; few sweeps with a
-small window, as memory depends on neither. Each run is a process of its own. For views
-of another size than 2 megapixels `cache_size` is scaled with the pixels, so that as
-many images and maps are kept as there: a hundred views of 2 megapixels take more than
-an hour of a processor, and whether memory grows with the number of views shows on small
-ones, too. The start is what passes from the call of the program to the first progress,
-with the default options on views of 640 x 480: cold, with nothing compiled, and warm.
+small window, as memory depends on neither. Each run is a separate process. For views of
+another size than 2 megapixels `cache_size` is scaled with the pixels, so that it holds
+as many images and maps as there: a hundred views of 2 megapixels take more than an hour
+of a processor, and small ones show as well whether memory grows with the number of
+views. The start is the time from the call of the program to the first progress, with
+the default options on views of 640 x 480: cold, with nothing compiled, and warm.
 
-Writes docs/measurements/stereo_memory.json, where what was measured of other sizes
-stays; then `python -m scripts.benchmarks.make_tables` puts the figures into
-the documents.
+Writes docs/measurements/stereo_memory.json; the figures of other sizes stay in it.
 """
 
 import argparse
 import contextlib
-import datetime
 import json
 import os
 import subprocess
@@ -33,9 +30,9 @@ import numpy as np
 import pycolmap
 from PIL import Image
 
-COMMAND = "scripts.benchmarks.matching.stereo_memory"
-REPOSITORY = Path(__file__).resolve().parents[3]
-RESULT = REPOSITORY / "docs" / "measurements" / "stereo_memory.json"
+from scripts.benchmarks.record import REPOSITORY, parser, read, stamp, write
+
+NAME = "matching.stereo_memory"
 LARGE_PX = (1632, 1224)
 START_PX = (640, 480)
 NUM_SOURCES = 6
@@ -80,10 +77,10 @@ class Started(BaseException):
 
 
 class MemoryPeaks:
-    """The progress of a run; it notes the peak of memory in each tenth of it.
+    """The progress of a run, which records the peak of memory in each tenth of it.
 
     The peak of the process before the first progress, when compiled kernels are loaded,
-    hides what comes after it, so Linux is told to begin anew at each step.
+    hides what comes after it, so it is reset at each step (Linux only).
 
     Attributes:
         ends_at_once: Whether to raise `Started` at the first progress.
@@ -92,7 +89,7 @@ class MemoryPeaks:
     """
 
     def __init__(self, ends_at_once: bool) -> None:
-        """Nothing is noted yet."""
+        """Start without any peak."""
         self.ends_at_once = ends_at_once
         self.whole_mb = 0.0
         self.tenths_mb = [0.0] * 10
@@ -121,7 +118,7 @@ def step_peak_mb() -> float:
     for line in Path("/proc/self/status").read_text().splitlines():
         if line.startswith("VmHWM:"):
             return int(line.split()[1]) / 1024
-    raise OSError("/proc/self/status tells no VmHWM: this needs Linux")
+    raise OSError("/proc/self/status has no VmHWM: this needs Linux")
 
 
 def run_child(workspace: Path, options: dict[str, Any], ends_at_once: bool) -> None:
@@ -150,12 +147,18 @@ def child(
     environment = dict(os.environ)
     if cache is not None:
         environment["NUMBA_CACHE_DIR"] = str(cache)
-    words = [sys.executable, __file__, "--child", str(workspace), json.dumps(options)]
+    module = [sys.executable, "-m", f"scripts.benchmarks.{NAME}"]
+    words = [*module, "--child", str(workspace), json.dumps(options)]
     if ends_at_once:
         words.append("--end-at-once")
     start = time.perf_counter()
     done = subprocess.run(
-        words, env=environment, stdout=subprocess.PIPE, check=True, text=True
+        words,
+        cwd=REPOSITORY,
+        env=environment,
+        stdout=subprocess.PIPE,
+        check=True,
+        text=True,
     )
     seconds = time.perf_counter() - start
     return {"seconds": round(seconds, 1), **json.loads(done.stdout)}
@@ -199,38 +202,34 @@ def measure_start() -> dict[str, float]:
 
 def measure_series(arguments: argparse.Namespace, keep: Keep) -> None:
     """Run after run of a size; each is kept when it is done."""
-    from resdepth_colmap.versions import versions
-
     width_px, height_px = arguments.size
     words = ["--size", *map(str, arguments.size), "--views", *map(str, arguments.views)]
     options = {"cache_size": scaled_cache((width_px, height_px))}
+    head = stamp(" ".join([NAME, *words]))
     series: dict[str, Any] = {
-        "command": " ".join([f"python -m {COMMAND}", *words]),
-        "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
-        "versions": versions(),
+        **head,
         "options": {**CHEAP, "num_sources": NUM_SOURCES, **options},
         "runs": [],
     }
-    for number in arguments.views:
-        run = measure_memory(number, (width_px, height_px), options)
+    for num_views in arguments.views:
+        run = measure_memory(num_views, (width_px, height_px), options)
         series["runs"].append(run)
-        keep({"sizes": {f"{width_px} x {height_px}": series}})
+        keep({**head, "sizes": {f"{width_px} x {height_px}": series}})
 
 
 def parsed() -> argparse.Namespace:
     """The command line."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--size", type=int, nargs=2, default=LARGE_PX)
-    parser.add_argument("--views", type=int, nargs="*", default=[12])
-    parser.add_argument("--skip-start", action="store_true")
-    parser.add_argument("--output", type=Path, default=RESULT)
-    parser.add_argument("--child", nargs=2, metavar=("WORKSPACE", "OPTIONS"))
-    parser.add_argument("--end-at-once", action="store_true")
-    return parser.parse_args()
+    options = parser(__doc__, "stereo_memory", reads_data=False)
+    options.add_argument("--size", type=int, nargs=2, default=LARGE_PX)
+    options.add_argument("--views", type=int, nargs="*", default=[12])
+    options.add_argument("--skip-start", action="store_true")
+    options.add_argument("--child", nargs=2, metavar=("WORKSPACE", "OPTIONS"))
+    options.add_argument("--end-at-once", action="store_true")
+    return options.parse_args()
 
 
 def main() -> None:
-    """Read the command line, measure, print and write."""
+    """Read the command line, measure and write."""
     arguments = parsed()
     if arguments.child:
         path, options = arguments.child
@@ -239,22 +238,13 @@ def main() -> None:
     output: Path = arguments.output
 
     def keep(part: dict[str, Any]) -> None:
-        kept = json.loads(output.read_text("utf-8")) if output.exists() else {}
+        kept = read(output)
         sizes = {**kept.get("sizes", {}), **part.get("sizes", {})}
-        write_down({**kept, **part, "sizes": sizes}, output)
+        write(output, {**kept, **part, "sizes": sizes})
 
     if not arguments.skip_start:
         keep({"start": measure_start()})
     measure_series(arguments, keep)
-
-
-def write_down(measured: dict[str, Any], output: Path) -> None:
-    """Write what was measured so far, and print it."""
-    from scripts.benchmarks.tables.stereo_memory import stereo_memory_table
-
-    output.parent.mkdir(parents=True, exist_ok=True)
-    output.write_text(json.dumps(measured, indent=2) + "\n", "utf-8")
-    print(stereo_memory_table(measured), flush=True)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""What a weights file is, read from itself."""
+"""The figures of a weights file, read from the file."""
 
 from pathlib import Path
 from typing import Any
@@ -7,13 +7,10 @@ from resdepth_colmap.network.weights import load_weights, read_facts, weights_ha
 
 
 def weights_facts(path: Path) -> dict[str, Any]:
-    """The figures that docs/measurements/weights.json holds of the shipped weights.
-
-    Args:
-        path: A weights file.
+    """The content of docs/measurements/weights.json for a weights file.
 
     Raises:
-        WeightsError: If the file is missing, broken or not ours.
+        WeightsError: If the file is missing, broken or of another program.
     """
     network = load_weights(path)
     return {

@@ -22,7 +22,7 @@ def test_each_source_shows_the_noise_of_the_plane_where_it_is_seen(
     assert len(sources) == num_sources
     column, row = width_px // 2, height_px // 2
     ray = np.linalg.inv(reference.K) @ [column, row, 1]
-    places = set()
+    columns_seen = set()
     for source in sources:
         xy, z = project(transform(source.cam_from_world, DEPTH * ray), source.K)
         x, y = np.rint(xy).astype(int)
@@ -30,8 +30,8 @@ def test_each_source_shows_the_noise_of_the_plane_where_it_is_seen(
         assert float(z) == DEPTH
         assert int(y) == row
         assert source.gray[y, x] == reference.gray[row, column]
-        places.add(x)
-    assert len(places) == num_sources
+        columns_seen.add(x)
+    assert len(columns_seen) == num_sources
 
 
 @pytest.mark.slow
@@ -49,8 +49,8 @@ def test_no_more_planes_are_counted_than_the_method_can_look_at() -> None:
 
     views = noise_views(0.002, 2)
     counts = [
-        count_evaluations(views, DEPTH_RANGE, StereoConfig(num_iterations=number))
-        for number in (1, 2)
+        count_evaluations(views, DEPTH_RANGE, StereoConfig(num_iterations=count))
+        for count in (1, 2)
     ]
     units = views[0].gray.size * 2
     assert units * 2 < counts[0] < counts[1]

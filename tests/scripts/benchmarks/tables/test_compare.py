@@ -1,69 +1,64 @@
-"""The tables that documents show of comparisons."""
+"""Laws of the tables of comparisons."""
 
 from typing import Any
 
-from scripts.benchmarks.tables.compare import comparison_table, score_gains
+from resdepth_colmap.evaluation.markdown import table
+from scripts.benchmarks.tables.compare import (
+    CLOUDS,
+    METRICS,
+    PAIRED,
+    cloud_rows,
+    difference,
+    paired_rows,
+)
+
+VIEWS = {"mean": 0.25, "interval": [0.1, 0.4], "num_better": 3, "num_worse": 0}
 
 
-def result(num_points: int | None = 1234) -> dict[str, Any]:
-    before = {"tolerances": [0.05], "accuracy": [0.9], "completeness": [0.4]}
-    after = {"tolerances": [0.05], "accuracy": [0.88], "completeness": [0.7]}
-    cloud = {"num_points": num_points, "note": "", "seconds": 1.0}
-    none = {"num_points": None, "note": "no tracks", "scores": None}
-    clouds = {
-        "filtered": {**cloud, "scores": {**before, "f1": [0.554]}},
-        "refined": {**cloud, "scores": {**after, "f1": [0.78]}},
-    }
-    views = {
-        "num_pairs": 3,
-        "mean": 0.25,
-        "median": 0.2,
-        "num_better": 3,
-        "num_worse": 0,
-        "interval": [0.1, 0.4],
-    }
+def scores(accuracy: float) -> dict[str, Any]:
     return {
-        "fusion": {"open3d": {"min_num_views": 3}, "colmap": {"min_num_pixels": 3}},
-        "clouds": {"open3d": clouds, "colmap": {"filtered": none, "refined": none}},
-        "measures": {"filtered": {"coverage": 0.5}, "refined": {"coverage": 0.75}},
-        "paired": {"refined - filtered": {"coverage": {"views": views}}},
-        "notes": ["a word"],
-        "cost": {"compare": {"seconds": 12.34, "peak_memory_mb": 512}},
+        "tolerances": [0.05, 0.1],
+        "accuracy": [accuracy, 1.0],
+        "completeness": [0.4, 1.0],
+        "f1": [0.554, 1.0],
+        "num_points": 1234,
     }
 
 
-def measured() -> dict[str, Any]:
+def result(has_reference: bool = True) -> dict[str, Any]:
+    ours = {
+        method: {"num_points": 1234, "scores": scores(0.9) if has_reference else None}
+        for method in ("filtered", "refined")
+    }
+    colmap = {"filtered": {"num_points": None, "note": "no tracks", "scores": None}}
     return {
-        "command": "python bench.py",
-        "date": "2026-01-02",
-        "weights_sha256": "0123456789abcdef",
-        "results": {"plant": result()},
+        "methods": ["filtered", "refined"],
+        "clouds": {"open3d": ours, "colmap": colmap},
+        "paired": {"refined - filtered": {"coverage": {"views": VIEWS}}},
     }
 
 
-def test_scores_differences_and_costs_have_their_rows() -> None:
-    text = comparison_table(measured())
-    row = "| plant | ours | filtered | 1,234 | 0.05 | 90.0 % | 40.0 % | 55.4 % |"
-    assert row in text
-    assert "| plant | COLMAP's | refined | - | - | - | - | - |" in text
-    assert "| plant | ours | 0.05 | -2.0 | +30.0 | +22.6 |" in text
-    assert (
-        "| plant | coverage | refined - filtered | 50.0 | - | 75.0 | "
-        "25.0 | 10.0 | 40.0 | 3 | 0 |"
-    ) in text
-    assert "| plant | compare | 12.3 | 0.50 GiB |" in text
-    assert "- plant: COLMAP's fusion: no tracks." in text
-    assert "`min_num_views` 3" in text
+def test_each_method_has_the_scores_at_the_smallest_tolerance() -> None:
+    text = table(CLOUDS, cloud_rows({"results": {"room": result()}}))
+    cells = "1,234 | 90.0 % | 40.0 % | 55.4 % | - | - | - | - |"
+    assert f"| room | filtered | 0.05 | {cells}" in text
+    assert f"| room | refined | 0.05 | {cells}" in text
 
 
-def test_each_table_has_one_number_of_columns() -> None:
-    for part in comparison_table(measured()).split("\n\n"):
-        lines = [line for line in part.splitlines() if line.startswith("|")]
-        assert len({line.count("|") for line in lines}) <= 1
+def test_without_a_reference_cloud_there_is_no_row() -> None:
+    measured = {"results": {"plant": result(has_reference=False)}}
+    assert list(cloud_rows(measured)) == []
 
 
-def test_no_gain_is_said_without_scores() -> None:
-    assert list(score_gains(result(), "colmap")) == []
-    unscored = result()
-    del unscored["clouds"]["open3d"]["filtered"]
-    assert list(score_gains(unscored, "open3d")) == []
+def test_each_pair_of_methods_has_its_differences_with_their_intervals() -> None:
+    text = table(PAIRED, paired_rows({"results": {"plant": result()}}))
+    dashes = " | ".join(["-"] * (len(METRICS) - 1))
+    assert text.endswith(
+        f"| plant | refined - filtered | +25.0 [10.0, 40.0] | {dashes} |"
+    )
+
+
+def test_what_was_not_measured_has_no_difference() -> None:
+    assert difference(None) is None
+    assert difference({**VIEWS, "mean": None}) is None
+    assert difference({**VIEWS, "interval": None}) == "+25.0"

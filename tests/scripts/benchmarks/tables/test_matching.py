@@ -2,98 +2,94 @@
 
 from typing import Any
 
-from scripts.benchmarks.tables.matching import matching_table
+import pytest
 
-ERRORS = {"0.01": 0.75, "0.02": 0.875, "0.05": 0.95, "median": 0.00123, "mae": 0.0456}
-MAPS = {"pixels": 0.5, "photometric": ERRORS, "geometric": {**ERRORS, "0.02": 0.9375}}
-SECONDS = {"photometric": 12.34, "geometric": None}
+from resdepth_colmap.evaluation.markdown import table
+from scripts.benchmarks.tables.matching import (
+    NEAR_COLMAP,
+    OPENMVS,
+    SPEED,
+    TRUTH,
+    memory_note,
+    near_colmap_rows,
+    speed_rows,
+    truth_rows,
+)
+
+ERRORS = {"0.01": 0.75, "0.02": 0.875, "0.05": 0.95, "median": 0.00123}
+PART = {
+    "maps": {
+        name: {"photometric": {**ERRORS, "0.01": share}, "geometric": ERRORS}
+        for name, share in (("a.jpg", 0.5), ("b.jpg", 0.7))
+    },
+    "mean": {"photometric": ERRORS, "geometric": {**ERRORS, "0.01": 0.8}},
+    "cpu_s_per_map": {"photometric": 12.34, "geometric": None},
+}
 
 
-def part(**more: Any) -> dict[str, Any]:
-    return {"maps": {"a.jpg": MAPS}, "mean": MAPS, "cpu_s_per_map": SECONDS, **more}
-
-
-def rendered() -> dict[str, Any]:
-    filtered = {"accuracy": 0.99, "completeness": 0.9, "kept": 0.91}
-    cloud = {"points": 12345, "accuracy": 0.9, "completeness": 0.8, "f1": 0.847}
-    clouds = {"true_points": 1000, "min_num_pixels=5": cloud}
-    scene = part(mean={**MAPS, "filtered": filtered}, cloud=clouds)
-    return {"rendered_rich": scene, "rendered_weak": scene}
-
-
-def speed() -> dict[str, Any]:
-    run = {
-        "megapixels": 0.3,
-        "num_sources": 2,
-        "cpu_s": 4.0,
-        "cpu_s_per_mp_source_iteration": 3.21,
-    }
-    bounds = {
-        "evaluations_per_px_source_iteration": 9.5,
-        "ns_per_evaluation_in_cache": 50.0,
-        "ns_per_window_in_cache": 40.0,
-        "gb_per_s": 10.0,
-        "arithmetic_s": 2.0,
-        "memory_s": 0.01,
-        "ours_s": 4.0,
-        "ours_over_bound": 2.0,
-    }
-    threads = [{"threads": 1, "cpu_s": 4.0, "wall_s": 5.0}]
-    lists = {"threads": threads, "sources": [run], "sizes": [run], "load": [1.0, 2.0]}
-    return {**lists, "bounds": bounds, "num_iterations": 2}
+def run(megapixels: float, num_sources: int) -> dict[str, Any]:
+    times = {"cpu_s": 4.0, "cpu_s_per_mp_source_iteration": 3.21}
+    return {"megapixels": megapixels, "num_sources": num_sources, **times}
 
 
 def measured() -> dict[str, Any]:
-    options = {"depth_min": 1.5, "depth_max": 12.0}
-    plant = {label: part(options=options) for label in ("own_range", "range_of_maps")}
-    return {
-        "command": "python bench.py",
+    cloud = {"true_points": 1000, "min_num_pixels=5": {"f1": 0.847}}
+    rendered = {
         "date": "2026-01-02",
-        "plant": plant,
-        "middlebury": part(),
-        "rendered": rendered(),
-        "speed": speed(),
+        "rendered_rich": {**PART, "cloud": cloud},
+        "rendered_weak": PART,
     }
-
-
-def test_every_table_is_whole() -> None:
-    text = matching_table(measured())
-    tables = [block for block in text.split("\n\n") if block.startswith("|")]
-    assert len(tables) == 6
-    for table in tables:
-        assert len({line.count("|") for line in table.splitlines()}) == 1
-
-
-def test_maps_are_told_by_both_passes_and_means_have_a_row() -> None:
-    text = matching_table({**measured(), "plant": measured()["plant"]})
-    within = "75.0 % | 87.5 % | 95.0 % | 75.0 % | 93.8 % | 95.0 %"
-    assert f"| a.jpg | 50.0 % | {within} |" in text
-    assert f"| **mean** |  | {within} |" in text
-    assert "12.3 photometric, - more geometric" in text
-    assert "between 1.50 and 12.00" in text
+    speed = {
+        "sizes": [run(0.3, 1), run(0.75, 1), run(1.5, 1)],
+        "sources": [run(0.3, 1), run(0.3, 2)],
+        "bounds": {"arithmetic_s": 2.0, "memory_s": 0.01, "ours_s": 4.0},
+    }
+    plant = {"own_range": PART}
+    return {"middlebury": PART, "rendered": rendered, "plant": plant, "speed": speed}
 
 
 def test_cited_figures_stand_beside_ours() -> None:
-    text = matching_table(measured())
-    assert "| a.jpg | 0.123 % | 25.0 % | 12.5 % | 0.046 |" in text
-    assert "cited: mean | 0.287 % | 26.1 % | 19.6 % |" in text
-    assert "| rendered weak | OpenMVS 2.3 (CPU), cited | 90.5 % | 0.072 % | 27.0 |" in (
-        text
-    )
-    cells = "`min_num_pixels=5` | 90.0 % | 80.0 % | 84.7 % | 12,345 |"
-    assert f"| rendered rich | cloud, {cells}" in text
+    text = table(TRUTH, truth_rows(measured()))
+    ours = "25.0 % | 0.123 % | 12.3 | 20.0 % | 0.123 % | -"
+    assert f"| middlebury | {ours} | 26.1 % | 0.287 % | 7.3 | - |" in text
+    assert f"| rendered rich | {ours} | 6.2 % | 0.015 % | 27.0 | 84.7 % |" in text
+    assert len(text.splitlines()) == 2 + len(OPENMVS)
 
 
-def test_the_nearer_bound_is_named() -> None:
-    text = matching_table(measured())
-    assert "2.00 times the nearer bound, which is arithmetic" in text
-    slow_memory = speed()
-    slow_memory["bounds"] |= {"memory_s": 3.0, "ours_over_bound": 1.33}
-    assert "Bounds: memory, 3.000 s; we take 4.00 s, 1.33 times" in matching_table(
-        {**measured(), "speed": slow_memory}
-    )
+def test_agreement_with_colmap_is_the_mean_and_the_worst_of_the_images() -> None:
+    shares = {"within_2": 0.8, "within_5": 0.9}
+    images = {
+        name: {
+            "unfiltered": {"within_1": before, **shares},
+            "refined": {"within_1": 0.7, **shares},
+        }
+        for name, before in (("a.jpg", 0.5), ("b.jpg", 0.6))
+    }
+    text = table(NEAR_COLMAP, near_colmap_rows({"images": images}, measured()))
+    rest = "80.0 % | 90.0 % |"
+    assert f"| COLMAP's, unfiltered | 55.0 % | {rest} 50.0 % | 60.0 % |" in text
+    assert f"| the same, refined | 70.0 % | {rest} 70.0 % | 70.0 % |" in text
+    assert "photometric | 60.0 % | 87.5 % | 95.0 % | 50.0 % | 70.0 % |" in text
 
 
-def test_what_was_not_measured_is_left_out() -> None:
-    text = matching_table({"command": "x", "date": "2026-01-02"})
-    assert "|" not in text
+def test_every_other_size_and_number_of_sources_is_shown() -> None:
+    text = table(SPEED, speed_rows(measured(), {}))
+    assert [line[:12] for line in text.splitlines()[2:]] == [
+        "| 0.30 | 1 |",
+        "| 1.50 | 1 |",
+        "| 0.30 | 2 |",
+    ]
+
+
+@pytest.mark.parametrize("larger", ["1632 x 1224", "240 x 180"])
+def test_memory_is_that_of_the_largest_views(larger: str) -> None:
+    peaks_mb = {100: 2e3, 12: 9}
+    runs = [{"views": count, "peak_memory_mb": mb} for count, mb in peaks_mb.items()]
+    memory = {
+        "sizes": {"64 x 48": {"runs": []}, larger: {"runs": runs}},
+        "start": {"cold_s": 30.4, "warm_s": 2.34},
+    }
+    note = memory_note(measured(), memory)
+    assert f"views of {larger} px: 9 MiB for 12, 2,000 MiB for 100." in note
+    assert "30 s with nothing compiled, 2.3 s" in note
+    assert "bound for two sources: 2.00 s, of 4.00 s measured" in note

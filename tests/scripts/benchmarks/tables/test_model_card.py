@@ -1,6 +1,5 @@
 """Laws of the model card's tables, and whether the card is that of the weights."""
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -8,28 +7,27 @@ from workspaces import identity_weights
 
 from resdepth_colmap.network.network_config import NetworkConfig
 from resdepth_colmap.network.weights import default_weights_path, weights_hash
+from scripts.benchmarks.record import MEASUREMENTS, REPOSITORY, read
 from scripts.benchmarks.tables.model_card import (
     CHANNELS,
-    SHORT_HASH,
-    training_table,
-    weights_table,
+    short_hash,
+    training_text,
+    weights_text,
 )
 from scripts.benchmarks.tables.weights_facts import weights_facts
 
-REPOSITORY = Path(__file__).resolve().parents[4]
-MEASUREMENTS = REPOSITORY / "docs" / "measurements"
 CARD = REPOSITORY / "docs" / "model_card.md"
 
 
 def measured(name: str) -> Any:
-    return json.loads((MEASUREMENTS / f"{name}.json").read_text("utf-8"))
+    return read(MEASUREMENTS / f"{name}.json")
 
 
 def test_the_card_is_that_of_the_shipped_weights() -> None:
-    way_out = "run scripts/benchmarks/make_tables.py"
+    way_out = "run python -m scripts.benchmarks.make_tables"
     assert measured("weights") == weights_facts(default_weights_path()), way_out
     card = CARD.read_text("utf-8")
-    assert f"`{weights_hash()[:SHORT_HASH]}`" in card, way_out
+    assert f"`{short_hash(weights_hash())}`" in card, way_out
 
 
 def test_the_last_stage_of_the_training_made_the_shipped_weights() -> None:
@@ -49,14 +47,14 @@ def test_the_documents_lead_to_the_card() -> None:
 
 def test_what_the_card_says_of_a_file_is_what_the_file_is(tmp_path: Path) -> None:
     facts = weights_facts(identity_weights(tmp_path))
-    text = weights_table(facts)
-    assert facts["sha256"][:SHORT_HASH] in text
+    text = weights_text(facts)
+    assert short_hash(facts["sha256"]) in text
     assert "2 levels, 4 to 512 channels" in text
-    assert "a gate that weighs it; the expected error" in text
+    assert "a gate that weights it; the expected error" in text
     for channel in facts["channels"]:
         assert CHANNELS[channel] in text
     plain = {**facts, "network": {**facts["network"], "gate": False}}
-    assert "gate" not in weights_table(plain)
+    assert "gate" not in weights_text(plain)
 
 
 def test_every_input_of_the_default_network_has_words() -> None:
@@ -85,7 +83,7 @@ def test_a_stage_is_a_row_and_what_is_not_known_a_dash() -> None:
         "minutes": 27,
         "held_out": {"mae_ratio": 0.456, "medae_ratio": 0.9},
     }
-    text = training_table({"hardware": "a machine", "stages": [stage, known]})
+    text = training_text({"hardware": "a machine", "stages": [stage, known]})
     assert (
         "| 1 ([ADR 0005](adr/0005-first-weights.md)) | random weights | unfiltered | "
         "1,274 | - | 4,000 | 4 of 512 x 384 | 0.001 | - | - | - | `0123456789ab` |"

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from resdepth_colmap.evaluation.metrics.depth_metrics import depth_metrics
-from scripts.benchmarks.variant_errors import method_errors, method_summaries
+from scripts.benchmarks.variants.errors import method_errors, method_summaries
 
 TRUTH = np.full((12, 10), 2.0, np.float32)
 
@@ -24,7 +24,7 @@ def test_a_ratio_is_the_error_over_the_initial_one(before: float, after: float) 
     assert summary["bad_2"] == float(after > 0.02 * 2.0)
 
 
-def test_the_initial_map_and_its_median_are_arms_too() -> None:
+def test_the_initial_map_and_its_median_are_methods_too() -> None:
     initial = moved(0.1)
     initial[5, 5] = 9.0
     errors = method_errors(initial, {}, TRUTH)
@@ -47,5 +47,5 @@ def test_means_are_over_views_and_a_view_without_error_has_no_ratio() -> None:
     assert only["mae_ratio"] is None
 
 
-def test_no_views_are_no_arms() -> None:
+def test_no_views_are_no_methods() -> None:
     assert method_summaries({}) == {}

@@ -1,4 +1,4 @@
-"""Errors of several networks on the same views, and what they come to."""
+"""Errors of several networks on the same views, and their means."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -14,7 +14,7 @@ RATIOS = ("mae", "medae")
 INITIAL, MEDIAN = "unfiltered", "median"
 
 MethodErrors = dict[str, dict[str, float]]
-"""By arm, then by measure."""
+"""By method, then by measure."""
 
 
 def method_errors(
@@ -24,7 +24,7 @@ def method_errors(
 
     Args:
         initial: Shape (H, W), in units; 0 = no depth.
-        refined: By arm, same shape.
+        refined: By method, same shape.
         truth: Same shape; 0 = not known.
     """
     maps = {INITIAL: initial, MEDIAN: median_filtered(initial), **refined}
@@ -39,11 +39,11 @@ def method_summaries(views: Mapping[str, MethodErrors]) -> dict[str, dict[str, A
     """Means over the views: of each error, and of its ratio to that of the initial map.
 
     Args:
-        views: What `arm_errors` said of each view, by name. A view whose initial map
-            has no error of a kind does not count in that ratio.
+        views: The result of `method_errors` of each view, by name. A view whose initial
+            map has no error of a kind does not count in that ratio.
 
     Returns:
-        By arm: the means, the ratios `<measure>_ratio`, and each view's MAE.
+        By method: the means, the ratios `<measure>_ratio`, and each view's MAE.
     """
     methods = next(iter(views.values()), {})
     return {method: _summary(method, views) for method in methods}

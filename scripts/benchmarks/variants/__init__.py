@@ -1,0 +1,1 @@
+"""Training and comparison of network variants with equal budgets."""
