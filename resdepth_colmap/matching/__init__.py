@@ -2,6 +2,6 @@
 
 from pathlib import Path
 
-from resdepth_colmap.matching.kernel_cache import forget_stale_kernels
+from resdepth_colmap.matching.compilation import forget_stale_kernels
 
 forget_stale_kernels(Path(__file__).parent)

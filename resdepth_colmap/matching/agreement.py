@@ -1,16 +1,24 @@
-"""Whether a source agrees with each pixel. Compiled by numba."""
+"""Whether a source agrees with each pixel. Compiled by numba.
+
+The tests of COLMAP's filter (patch_match_cuda.cu, end of SweepFromTopToBottom):
+triangulation angle and incident angle (ComputeViewingAngles), photo-consistency, and
+forward-backward reprojection error (ComputeGeomConsistencyCost).
+"""
 
 import math
 
+import numpy as np
 from numba import njit, prange
 
-from resdepth_colmap.matching import sweeps  # noqa: F401 (chooses the threading layer)
+from resdepth_colmap.matching.compilation import choose_threading_layer
+
+choose_threading_layer()
 
 
 @njit(cache=True, parallel=True)
 def mark_agreeing(depth, normals, K, cost, source_K, source_from_reference,
                   source_depth, limits, agrees):  # fmt: skip
-    """Mark the pixels that a source agrees with (COLMAP, patch_match_cuda.cu).
+    """Mark the pixels that a source agrees with.
 
     Args:
         depth: Of the reference, shape (H, W); 0 = none, which nobody agrees with.
@@ -20,19 +28,17 @@ def mark_agreeing(depth, normals, K, cost, source_K, source_from_reference,
         source_K: Shape (3, 3), float64.
         source_from_reference: Shape (3, 4), float64.
         source_depth: Of the source; empty = there is none to agree with.
-        limits: Largest cost, largest cosine of the angle between the rays, largest
-            error there and back in pixels; float64.
+        limits: Largest cost, largest cosine of the triangulation angle, largest
+            forward-backward reprojection error in pixels; float64.
         agrees: The result, shape (H, W), bool.
     """
     height, width = depth.shape
     pose = source_from_reference
-    center_x = -(pose[0, 0] * pose[0, 3] + pose[1, 0] * pose[1, 3]
-                 + pose[2, 0] * pose[2, 3])  # fmt: skip
-    center_y = -(pose[0, 1] * pose[0, 3] + pose[1, 1] * pose[1, 3]
-                 + pose[2, 1] * pose[2, 3])  # fmt: skip
-    center_z = -(pose[0, 2] * pose[0, 3] + pose[1, 2] * pose[1, 3]
-                 + pose[2, 2] * pose[2, 3])  # fmt: skip
-    for row in prange(height):
+    center_x, center_y, center_z = _rotated_back(
+        pose, -pose[0, 3], -pose[1, 3], -pose[2, 3]
+    )
+    for index in prange(height):
+        row = np.int64(index)  # signed in all kernels: they are compiled once
         for column in range(width):
             agrees[row, column] = False
             z = depth[row, column]
@@ -54,17 +60,19 @@ def mark_agreeing(depth, normals, K, cost, source_K, source_from_reference,
 
 @njit(cache=True)
 def _error_px(x, y, z, row, column, K, source_K, pose, source_depth):
-    """Error of a point, seen there and lifted by the source's depth, back here.
+    """Forward-backward reprojection error of a point, in pixels; inf = not seen.
 
-    As in COLMAP, the depth is that of the nearest pixel, the ray that of the point.
+    As in COLMAP, the depth in the source is that of the nearest pixel, and the ray is
+    that of the point.
     """
     xs = pose[0, 0] * x + pose[0, 1] * y + pose[0, 2] * z + pose[0, 3]
     ys = pose[1, 0] * x + pose[1, 1] * y + pose[1, 2] * z + pose[1, 3]
     zs = pose[2, 0] * x + pose[2, 1] * y + pose[2, 2] * z + pose[2, 3]
     if zs <= 0:
         return math.inf
-    nearest_column = math.floor(xs / zs * source_K[0, 0] + source_K[0, 2] + 0.5)
-    nearest_row = math.floor(ys / zs * source_K[1, 1] + source_K[1, 2] + 0.5)
+    column_there, row_there = _pixel(xs, ys, zs, source_K)
+    nearest_column = math.floor(column_there + 0.5)
+    nearest_row = math.floor(row_there + 0.5)
     height, width = source_depth.shape
     if not (0 <= nearest_column < width and 0 <= nearest_row < height):
         return math.inf
@@ -74,12 +82,24 @@ def _error_px(x, y, z, row, column, K, source_K, pose, source_depth):
     dx = xs * lifted / zs - pose[0, 3]
     dy = ys * lifted / zs - pose[1, 3]
     dz = lifted - pose[2, 3]
-    back_x = pose[0, 0] * dx + pose[1, 0] * dy + pose[2, 0] * dz
-    back_y = pose[0, 1] * dx + pose[1, 1] * dy + pose[2, 1] * dz
-    back_z = pose[0, 2] * dx + pose[1, 2] * dy + pose[2, 2] * dz
+    back_x, back_y, back_z = _rotated_back(pose, dx, dy, dz)
     if back_z <= 0:
         return math.inf
-    return math.hypot(
-        back_x / back_z * K[0, 0] + K[0, 2] - column,
-        back_y / back_z * K[1, 1] + K[1, 2] - row,
+    column_back, row_back = _pixel(back_x, back_y, back_z, K)
+    return math.hypot(column_back - column, row_back - row)
+
+
+@njit(cache=True, inline="always")
+def _pixel(x, y, z, K):
+    """Column and row of a point in the camera frame."""
+    return x / z * K[0, 0] + K[0, 2], y / z * K[1, 1] + K[1, 2]
+
+
+@njit(cache=True, inline="always")
+def _rotated_back(pose, x, y, z):
+    """A vector in the frame that the pose (3, 4) maps from."""
+    return (
+        pose[0, 0] * x + pose[1, 0] * y + pose[2, 0] * z,
+        pose[0, 1] * x + pose[1, 1] * y + pose[2, 1] * z,
+        pose[0, 2] * x + pose[1, 2] * y + pose[2, 2] * z,
     )

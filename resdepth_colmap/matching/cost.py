@@ -1,24 +1,21 @@
-"""How well a plane explains a source view: bilateral NCC. Compiled by numba.
+"""How well a plane explains a source view: bilaterally weighted NCC. Compiled by numba.
 
-All arrays are float32. Sources lie one after the other in one flat array, so that any
-number of images of any size is one argument.
+Schoenberger et al. (ECCV 2016), "Photometric Consistency"; COLMAP, patch_match_cuda.cu,
+PhotoConsistencyCostComputer, and gpu_mat_ref_image.h, BilateralWeightComputer.
 """
 
 import math
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
+
+from resdepth_colmap.config import StereoConfig
+from resdepth_colmap.matching.views import ONE, SMALL, ZERO, FloatArray, project
 
 MAX_COST = np.float32(2.0)  # COLMAP's kMaxCost: 1 - NCC of perfectly opposite patches
 OUTSIDE = np.float32(1.0)  # the source does not see the plane: neither good nor bad
-NUM_LEVELS = 3  # of blur: 0, 1 and 2 px, with windows of 1, 2 and 4 times the size
 MIN_VARIANCE = np.float32(1e-5)  # COLMAP: below it a patch has no texture
-ZERO, ONE, SMALL = np.float32(0), np.float32(1), np.float32(1e-3)
-
-FloatArray = npt.NDArray[np.float32]
-IntArray = npt.NDArray[np.int64]
 
 
 class Window(NamedTuple):
@@ -37,33 +34,66 @@ class Window(NamedTuple):
     sigma_color: np.float32
 
 
-class Sources(NamedTuple):
-    """The source views, as seen from the reference.
+class Patch(NamedTuple):
+    """What the reference shows in the window about a pixel.
 
     Attributes:
-        A: Shape (S, 3, 3): a pixel lies at ``A (x, y, 1) + b inverse_depth``.
-        b: Shape (S, 3).
-        pixels: Grey values of all images, one image after the other, at each level of
-            blur, shape (NUM_LEVELS, pixels of all images).
-        inverse_depths: Their inverse depth maps likewise, 0 = none; or empty.
-        starts: Where each image starts, (S,).
-        sizes: Width and height of each, (S, 2).
+        x: The pixel.
+        y: Likewise.
+        level: Level of blur; the window is ``2**level`` times its size.
+        mean: Weighted mean of the grey values.
+        variance: Weighted variance of the grey values.
+        weights: Bilateral weights, shape (N,); they sum to 1.
+        values: Grey values, shape (N,).
     """
 
-    A: FloatArray
-    b: FloatArray
-    pixels: FloatArray
-    inverse_depths: FloatArray
-    starts: IntArray
-    sizes: IntArray
+    x: np.float32
+    y: np.float32
+    level: int
+    mean: np.float32
+    variance: np.float32
+    weights: FloatArray
+    values: FloatArray
+
+
+def make_window(config: StereoConfig) -> Window:
+    """The window's samples, filled up to a multiple of 8."""
+    radius = config.window_radius
+    steps = np.arange(-radius, radius + 1, config.window_step, dtype=np.float32)
+    dx, dy = (grid.ravel() for grid in np.meshgrid(steps, steps))
+    # COLMAP: sigma_spatial is the window's radius.
+    spatial = np.exp(-(dx**2 + dy**2) / (2.0 * radius**2))
+    fill = (0, -len(dx) % 8)
+    return Window(
+        dx=np.pad(dx, fill),
+        dy=np.pad(dy, fill),
+        spatial=np.pad(spatial, fill).astype(np.float32),
+        sigma_color=np.float32(config.sigma_color),
+    )
+
+
+@njit(cache=True, fastmath=True, inline="always")
+def reference_patch(levels, x, y, window, weights, values):
+    """The patch of the reference at the first level of blur that has texture.
+
+    Where a window shows nothing, one of twice the size on a blurred image may: what the
+    coarse scales of ACMM (Xu & Tao, CVPR 2019) are for, pixel by pixel.
+
+    Args:
+        levels: Grey values of the reference, shape (NUM_LEVELS, H, W).
+        x: The pixel.
+        y: Likewise.
+        window: Where the window is sampled.
+        weights: Memory for the weights of the patch, shape (N,).
+        values: Likewise for its grey values.
+    """
+    level, mean, variance = _weighted_window(levels, x, y, window, weights, values)
+    return Patch(np.float32(x), np.float32(y), level, mean, variance, weights, values)
 
 
 @njit(cache=True, fastmath=True)
-def reference_window(levels, x, y, window, weights, values):
-    """Bilateral weights of a window, at the first level of blur that has texture.
-
-    Where a window shows nothing, one of twice the size on a blurred image may: what the
-    coarse scales of ACMM are for (section 3.3), pixel by pixel.
+def _weighted_window(levels, x, y, window, weights, values):
+    """Fill weights and values.
 
     Returns:
         The level, and weighted mean and variance of the reference's grey values.
@@ -79,7 +109,7 @@ def reference_window(levels, x, y, window, weights, values):
 
 @njit(cache=True, fastmath=True)
 def _window_at(reference, x, y, scale, window, weights, values):
-    """Bilateral weights of a window (COLMAP, patch_match_cuda.cu), summing to 1.
+    """Bilateral weights of a window (COLMAP, BilateralWeightComputer), summing to 1.
 
     The weight of a grey value, exp(-a), is taken as (1 - a / 8)^8, which needs no call
     and so lets the loop be vectorised.
@@ -121,26 +151,30 @@ def _window_at(reference, x, y, scale, window, weights, values):
     return mean, max(square * inverse - mean * mean, ZERO)
 
 
-@njit(cache=True, fastmath=True)
-def plane_cost(x, y, w, gx, gy, sources, s, level, window, weights, values, mean,
-               variance):  # fmt: skip
-    """1 - NCC of the reference's window and that of source s, in 0..2.
+@njit(cache=True, fastmath=True, inline="always")
+def plane_cost(plane, patch, window, sources, s):
+    """1 - NCC of the reference's patch and that of source s, in 0..2.
 
-    `OUTSIDE` where the plane's centre is behind the source or out of its image,
-    `MAX_COST` where there is no texture.
+    The source's patch is where the plane takes the window: slanted, as in Bleyer et al.
+    (PatchMatch Stereo, BMVC 2011).
+
+    Returns:
+        `OUTSIDE` where the plane's centre is behind the source or out of its image,
+        `MAX_COST` where there is no texture.
     """
-    A, b, pixels = sources.A, sources.b, sources.pixels[level]
-    scale = np.float32(1 << level)
+    A, b, pixels = sources.A, sources.b, sources.pixels[patch.level]
+    scale = np.float32(1 << patch.level)
     width, height = sources.sizes[s, 0], sources.sizes[s, 1]
     start = np.uint64(sources.starts[s])
-    u0 = A[s, 0, 0] * x + A[s, 0, 1] * y + A[s, 0, 2] + b[s, 0] * w
-    u1 = A[s, 1, 0] * x + A[s, 1, 1] * y + A[s, 1, 2] + b[s, 1] * w
-    u2 = A[s, 2, 0] * x + A[s, 2, 1] * y + A[s, 2, 2] + b[s, 2] * w
+    u0 = project(patch.x, patch.y, plane.w, sources, s, 0)
+    u1 = project(patch.x, patch.y, plane.w, sources, s, 1)
+    u2 = project(patch.x, patch.y, plane.w, sources, s, 2)
     if u2 < SMALL:
         return OUTSIDE
     xc, yc = u0 / u2, u1 / u2
     if not (xc >= 0 and yc >= 0 and xc <= width - 1 and yc <= height - 1):
         return OUTSIDE
+    gx, gy = plane.gx, plane.gy
     ux0, uy0 = A[s, 0, 0] + b[s, 0] * gx, A[s, 0, 1] + b[s, 0] * gy
     ux1, uy1 = A[s, 1, 0] + b[s, 1] * gx, A[s, 1, 1] + b[s, 1] * gy
     ux2, uy2 = A[s, 2, 0] + b[s, 2] * gx, A[s, 2, 1] + b[s, 2] * gy
@@ -170,14 +204,16 @@ def plane_cost(x, y, w, gx, gy, sources, s, level, window, weights, values, mean
         low = pixels[lower]
         low += ax * (pixels[lower + np.uint64(1)] - low)
         value = top + ay * (low - top)
-        weighted = weights[k] * value
+        weighted = patch.weights[k] * value
         source_mean += weighted
         source_square += weighted * value
-        product += weighted * values[k]
+        product += weighted * patch.values[k]
     source_variance = source_square - source_mean * source_mean
-    if variance < MIN_VARIANCE or source_variance < MIN_VARIANCE:
+    if patch.variance < MIN_VARIANCE or source_variance < MIN_VARIANCE:
         return MAX_COST
-    ncc = (product - mean * source_mean) / math.sqrt(variance * source_variance)
+    ncc = (product - patch.mean * source_mean) / math.sqrt(
+        patch.variance * source_variance
+    )
     cost = min(max(ONE - np.float32(ncc), ZERO), MAX_COST)
     # Exactly OUTSIDE would be taken for a plane out of sight.
     return cost if cost != OUTSIDE else np.float32(0.9999999)

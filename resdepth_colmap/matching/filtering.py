@@ -1,10 +1,11 @@
-"""What too few sources agree with is dropped: COLMAP's filter, with its meaning.
+"""Filtering: depth that too few sources agree with is dropped, as in COLMAP.
 
 A source agrees with a pixel if its patch looks alike (NCC), its ray meets the
-reference's at a sufficient angle, it sees the front of the surface and, where there is
-a depth map of the source, if that map leads back to the pixel (Schoenberger et al.,
-ECCV 2016, section 4.3; patch_match_cuda.cu). COLMAP compares a selection probability,
-smoothed along rows and columns, with that of the least NCC; here it is the NCC itself.
+reference's at a sufficient triangulation angle, it sees the front of the surface and,
+where there is a depth map of the source, if that map leads back to the pixel
+(Schoenberger et al., ECCV 2016, "Filtering and Fusion"; patch_match_cuda.cu). COLMAP
+compares a selection probability, smoothed along rows and columns, with that of the
+least NCC; here it is the NCC itself.
 """
 
 import math
@@ -22,10 +23,10 @@ _NO_DEPTH = np.zeros((0, 0), np.float32)
 
 
 class Filtered(NamedTuple):
-    """What is left of a result.
+    """A filtered result.
 
     Attributes:
-        surface: Depth and normals, 0 where they were dropped.
+        surface: Filtered depth and normals, 0 where they were dropped.
         agrees: Whether source s agrees with a pixel, shape (S, H, W), bool; nowhere
             where it was dropped.
     """

@@ -1,10 +1,27 @@
 """PatchMatch multi-view stereo of one reference view, on the CPU.
 
-The method is COLMAP's (Schoenberger et al., ECCV 2016: bilateral NCC, slanted planes,
-a photometric and a geometric pass) with the red-black propagation and view selection of
-ACMM (Xu & Tao, CVPR 2019), which suit many cores and need no sequential sweeps. What is
-not COLMAP's: a truncated smoothness term (`smoothness.py`), which decides where the
-photographs do not, and visibility in the geometric pass (`visibility.py`).
+The method is COLMAP's (Schoenberger et al., Pixelwise View Selection for Unstructured
+Multi-View Stereo, ECCV 2016: bilateral NCC, a photometric and a geometric pass) on the
+slanted planes of Bleyer et al. (PatchMatch Stereo, BMVC 2011), with the red-black
+propagation and view selection of ACMM (Xu & Tao, Multi-Scale Geometric Consistency
+Guided Multi-View Stereo, CVPR 2019), which suit many cores and need no sequential
+sweeps. What is not COLMAP's: a truncated smoothness term (`smoothness.py`), which
+decides where the images do not, and visibility in the geometric pass
+(`visibility.py`).
+
+=====================  =================================================
+`plane.py`             a hypothesis: inverse depth and its gradient
+`views.py`             reference and sources as arrays, projection
+`cost.py`              1 - NCC of a plane in a source
+`visibility.py`        the same beside the depth map of the source
+`smoothness.py`        roughness of the surface
+`random_planes.py`     random initialisation, perturbation
+`propagation.py`       planes from the surroundings
+`view_selection.py`    which sources count at a pixel
+`sweeps.py`            the iteration: propagate, select views, refine
+`plane_maps.py`        planes, normals and costs of all pixels
+`filtering.py`         what too few sources agree with (`agreement.py`)
+=====================  =================================================
 """
 
 import dataclasses
@@ -25,7 +42,7 @@ from resdepth_colmap.scene import (
 )
 
 if TYPE_CHECKING:
-    from resdepth_colmap.matching.cost import Sources, Window
+    from resdepth_colmap.matching.sweeps import Iteration
 
 BAND_PIXELS = 400_000  # of all sources
 LEAST_ROWS = 16
@@ -85,15 +102,15 @@ def match_view(
     """Find depth and normal of every pixel of the reference view.
 
     The result depends on the inputs and `config.seed` alone, not on the number of
-    threads. The photometric pass starts by chance; the geometric one (COLMAP's
-    geom_consistency) starts from the photometric maps, and weighs the sources' maps.
+    threads. The photometric pass starts from random planes; the geometric one (COLMAP's
+    geom_consistency) from the photometric maps, and it weighs the sources' maps.
 
     Args:
         reference: The view whose maps are made.
         sources: At least one other view.
         depth_range: Nearest and farthest depth, in workspace units.
         config: Options; `max_image_size` and `max_num_sources` are the caller's.
-        start: The view's photometric maps; None = by chance.
+        start: The view's photometric maps; None = random planes.
         source_depths: Depth map of each source, of the size of its image, 0 = none;
             None = the photometric pass.
         on_step: Called after each fraction of a second's work with its number from 1
@@ -107,46 +124,66 @@ def match_view(
         raise ValueError("a reference view without sources cannot be matched.")
     if not 0 < near < far:
         raise ValueError(f"{depth_range=} but expected 0 < near < far.")
-    from resdepth_colmap.matching import sweeps  # numba: slow import
+    from resdepth_colmap.matching import plane_maps, sweeps  # numba: slow import
+    from resdepth_colmap.matching.cost import make_window
+    from resdepth_colmap.matching.views import Reference, blur_levels, pack_sources
 
     gray = reference.gray
-    levels = _blurred(gray)
     K = reference.K.astype(np.float32)
-    flat = _flat_sources(reference, sources, source_depths)
-    window = _window(config)
+    view = Reference(levels=blur_levels(gray), K=K)
+    grays = [source.gray for source in sources]
+    packed = pack_sources(*_projections(reference, sources), grays, source_depths)
+    window = make_window(config)
     w_range = np.array([1.0 / far, 1.0 / near], np.float32)
     planes = np.zeros((*gray.shape, 3), np.float32)
-    source_costs = np.zeros((len(sources), *gray.shape), np.float32)
     if start is None:
-        sweeps.random_planes(planes, K, w_range, config.seed)
+        plane_maps.random_planes(planes, K, w_range, config.seed)
     else:
-        sweeps.planes_of(start.depth, start.normals, K, w_range, planes)
-    sweeps.match_costs(levels, planes, flat, window, source_costs)
+        plane_maps.planes_of(start.depth, start.normals, K, w_range, planes)
+    source_costs = np.zeros((len(sources), *gray.shape), np.float32)
+    plane_maps.costs_of(planes, view, packed, window, source_costs)
     costs = source_costs.mean(axis=0)
     geometric = source_depths is not None
-    half = (config.num_iterations + 1) // 2
-    total = half if geometric else config.num_iterations
-    # The geometric pass goes on where the photometric one stopped.
-    first = config.num_iterations + 1 if geometric else 1
-    bands = _bands(gray, len(sources))
-    step, num_steps = 0, total * 2 * len(bands)
-    for number in range(first, first + total):
-        # Smooth from the start, chance would freeze into islands.
-        smoothness = np.float32(config.smoothness if number > half else 0.0)
-        for color, rows in itertools.product((0, 1), bands):
-            sweeps.sweep(
-                *(levels, K, planes, costs, flat, window, w_range, smoothness),
-                *(config.seed, number, color, geometric, rows),
-            )
+    iterations = _iterations(config, w_range, geometric)
+    turns = list(itertools.product((0, 1), _bands(gray, len(sources))))
+    step, num_steps = 0, len(iterations) * len(turns)
+    for iteration in iterations:
+        for color, rows in turns:
+            sweeps.sweep(view, packed, window, iteration, planes, costs, color, rows)
             step += 1
             if on_step:
                 on_step(step, num_steps)
-    sweeps.match_costs(levels, planes, flat, window, source_costs)
+    plane_maps.costs_of(planes, view, packed, window, source_costs)
     normals = np.zeros((*gray.shape, 3), np.float32)
-    sweeps.normals_of(planes, K, normals)
+    plane_maps.normals_of(planes, K, normals)
     return MatchResult(
         depth=np.reciprocal(planes[..., 0]), normals=normals, source_costs=source_costs
     )
+
+
+def _iterations(
+    config: StereoConfig, w_range: FloatMap, geometric: bool
+) -> "list[Iteration]":
+    """The iterations of a pass; half as many in the geometric one.
+
+    That goes on where the photometric one stopped, in view selection and smoothness:
+    smooth from the start, chance would freeze into islands.
+    """
+    from resdepth_colmap.matching.sweeps import Iteration  # numba: slow import
+
+    half = (config.num_iterations + 1) // 2
+    first = config.num_iterations + 1 if geometric else 1
+    count = half if geometric else config.num_iterations
+    return [
+        Iteration(
+            t=t,
+            w_range=w_range,
+            smoothness=np.float32(config.smoothness if t > half else 0.0),
+            geometric=geometric,
+            seed=config.seed,
+        )
+        for t in range(first, first + count)
+    ]
 
 
 def _bands(gray: GrayImage, num_sources: int) -> list[tuple[int, int]]:
@@ -154,45 +191,6 @@ def _bands(gray: GrayImage, num_sources: int) -> list[tuple[int, int]]:
     height, width = gray.shape
     rows = max(LEAST_ROWS, BAND_PIXELS // (width * num_sources))
     return [(top, min(top + rows, height)) for top in range(0, height, rows)]
-
-
-def _flat_sources(
-    reference: MatchView,
-    sources: Sequence[MatchView],
-    source_depths: Sequence[DepthMap] | None,
-) -> "Sources":
-    """The sources as the kernels take them."""
-    from resdepth_colmap.matching.cost import NUM_LEVELS, Sources
-
-    sizes = np.array([source.gray.shape[::-1] for source in sources], np.int64)
-    ends = np.cumsum(sizes.prod(axis=1))
-    pixels = np.concatenate(
-        [_blurred(view.gray).reshape(NUM_LEVELS, -1) for view in sources], axis=1
-    )
-    inverse = np.zeros(0, np.float32)
-    if source_depths is not None:
-        depths = np.concatenate([depth.ravel() for depth in source_depths])
-        inverse = np.divide(1.0, depths, out=np.zeros_like(depths), where=depths > 0)
-    A, b = _projections(reference, sources)
-    return Sources(
-        A=A,
-        b=b,
-        pixels=pixels,
-        inverse_depths=inverse.astype(np.float32),
-        starts=ends - sizes.prod(axis=1),
-        sizes=sizes,
-    )
-
-
-def _blurred(gray: GrayImage) -> FloatMap:
-    """The image at each level of blur: with 0, 1, 2 px."""
-    import cv2
-
-    from resdepth_colmap.matching.cost import NUM_LEVELS
-
-    sigmas = [2.0 ** (level - 1) for level in range(1, NUM_LEVELS)]
-    blurred = [cv2.GaussianBlur(gray, (0, 0), sigma) for sigma in sigmas]
-    return np.stack([gray, *blurred]).astype(np.float32)
 
 
 def _projections(
@@ -205,21 +203,3 @@ def _projections(
         A.append(source.K @ pose[:, :3] @ np.linalg.inv(reference.K))
         b.append(source.K @ pose[:, 3])
     return np.array(A, np.float32), np.array(b, np.float32)
-
-
-def _window(config: StereoConfig) -> "Window":
-    """The window's samples, filled up to a multiple of 8."""
-    from resdepth_colmap.matching.cost import Window
-
-    radius = config.window_radius
-    steps = np.arange(-radius, radius + 1, config.window_step, dtype=np.float32)
-    dx, dy = (grid.ravel() for grid in np.meshgrid(steps, steps))
-    # COLMAP: sigma_spatial is the window's radius.
-    spatial = np.exp(-(dx**2 + dy**2) / (2.0 * radius**2))
-    fill = (0, -len(dx) % 8)
-    return Window(
-        dx=np.pad(dx, fill),
-        dy=np.pad(dy, fill),
-        spatial=np.pad(spatial, fill).astype(np.float32),
-        sigma_color=np.float32(config.sigma_color),
-    )

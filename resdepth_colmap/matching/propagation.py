@@ -1,15 +1,26 @@
-"""Which planes a pixel tries from its surroundings. Compiled by numba."""
+"""Which planes a pixel tries from its surroundings. Compiled by numba.
+
+Adaptive checkerboard sampling (Xu & Tao, ACMM, CVPR 2019, figure 1c; ACMM.cu,
+CheckerboardPropagation): from each of eight regions the plane of the least cost.
+"""
 
 import numpy as np
 from numba import njit
 
-from resdepth_colmap.matching.planes import faces_camera, plane_normal
+from resdepth_colmap.matching.plane import (
+    Plane,
+    faces_camera,
+    inverse_depth_beside,
+    load_plane,
+    plane_normal,
+    store_plane,
+)
 
-NUM_STATES = 9  # the pixel's own plane and those of eight regions
+NUM_PROPAGATED = 9  # the pixel's own plane and those of eight regions
 
-# The checkerboard's regions (Xu & Tao, ACMM, CVPR 2019, fig. 2): four near ones shaped
-# like a V and four far strips. All offsets are odd, so that a sweep over one colour
-# reads only the other one and its result does not depend on the order.
+# Four near regions shaped like a V and four far strips. All offsets are odd, so that a
+# sweep over one colour reads only the other one and its result does not depend on the
+# order.
 _NEAR = [(0, -1), (-1, -2), (1, -2), (-2, -3), (2, -3), (-3, -4), (3, -4)]
 _FAR = [(0, -step) for step in range(3, 25, 2)]
 REACH = 23
@@ -17,6 +28,7 @@ SAME_PX = np.float32(1e-3)
 
 
 def _regions() -> tuple[np.ndarray, np.ndarray]:
+    """Offsets of the pixels of each region, (8, most, 2), and how many there are."""
     offsets = np.zeros((8, len(_FAR), 2), np.int64)
     counts = np.zeros(8, np.int64)
     for turn in range(4):
@@ -52,7 +64,7 @@ def _best_of_region(costs, x, y, region):
 
 
 @njit(cache=True, fastmath=True)
-def gather_states(x, y, planes, costs, w_range, K, states):
+def propagate_planes(x, y, planes, costs, w_range, K, propagated):
     """The pixel's own plane, first, and the best of each region, as seen at the pixel.
 
     Args:
@@ -62,36 +74,41 @@ def gather_states(x, y, planes, costs, w_range, K, states):
         costs: Shape (H, W).
         w_range: Least and greatest inverse depth.
         K: Intrinsics of the reference.
-        states: Shape (NUM_STATES, 3), written.
+        propagated: Shape (NUM_PROPAGATED, 3), written.
 
     Returns:
-        Number of states.
+        Number of planes.
     """
     fx, fy = np.float32(x), np.float32(y)
-    for i in range(3):
-        states[0, i] = planes[y, x, i]
+    store_plane(propagated[0], load_plane(planes[y, x]))
     count = 1
     for region in range(8):
         xs, ys = _best_of_region(costs, x, y, region)
         if xs < 0:
             continue
-        gx, gy = planes[ys, xs, 1], planes[ys, xs, 2]
-        w = planes[ys, xs, 0] + gx * (x - xs) + gy * (y - ys)
+        there = load_plane(planes[ys, xs])
+        w = inverse_depth_beside(there, x - xs, y - ys)
         if w_range[0] <= w <= w_range[1]:
-            n = plane_normal(w, gx, gy, fx, fy, K)
-            if faces_camera(n[0], n[1], n[2], fx, fy, K):
-                states[count, 0], states[count, 1], states[count, 2] = w, gx, gy
+            plane = Plane(w, there.gx, there.gy)
+            if faces_camera(plane_normal(plane, fx, fy, K), fx, fy, K):
+                store_plane(propagated[count], plane)
                 count += 1
     return count
 
 
 @njit(cache=True, fastmath=True)
-def earlier_twin(states, index, px_per_inverse_depth):
-    """An earlier state that is the same plane, to a thousandth of a pixel; or -1."""
+def earlier_twin(planes, index, px_per_w):
+    """An earlier one that is the same plane, to a thousandth of a pixel; or -1.
+
+    Args:
+        planes: Shape (N, 3).
+        index: Of the plane.
+        px_per_w: Pixels of disparity per unit of inverse depth.
+    """
     for i in range(index):
-        off = abs(states[i, 0] - states[index, 0])
-        off += np.float32(4.0) * abs(states[i, 1] - states[index, 1])
-        off += np.float32(4.0) * abs(states[i, 2] - states[index, 2])
-        if off * px_per_inverse_depth < SAME_PX:
+        off = abs(planes[i, 0] - planes[index, 0])
+        off += np.float32(4.0) * abs(planes[i, 1] - planes[index, 1])
+        off += np.float32(4.0) * abs(planes[i, 2] - planes[index, 2])
+        if off * px_per_w < SAME_PX:
             return i
     return -1

@@ -5,7 +5,8 @@ import math
 import numpy as np
 from numba import njit
 
-from resdepth_colmap.matching.cost import OUTSIDE, SMALL, ZERO
+from resdepth_colmap.matching.cost import OUTSIDE
+from resdepth_colmap.matching.views import SMALL, ZERO, project
 
 # A bad match says no more than that something hides the surface, or that it has no
 # texture: beyond this cost no hypothesis is worse than another.
@@ -32,15 +33,17 @@ def bounded_cost(cost, geometric):
     return cost if geometric else min(cost, WORST_MATCH)
 
 
-@njit(cache=True, fastmath=True)
+@njit(cache=True, fastmath=True, inline="always")
 def geometric_cost(match_cost, x, y, w, sources, s):
     """The cost of a match, given the depth map of source s.
 
-    As in COLMAP and ACMM the re-projection error there and back counts, here as the
-    difference of the inverse depths times the pixels per unit, its first order. Beyond
-    a few pixels it matters on which side the source's surface lies: a plane behind it
-    may be hidden in that source, which costs little more than a bad match; a plane in
-    front of it would be seen there (free space, Merrell et al., ICCV 2007).
+    As in Schoenberger et al. (ECCV 2016), "Geometric Consistency" (COLMAP,
+    patch_match_cuda.cu, ComputeGeomConsistencyCost) and ACMM, the forward-backward
+    reprojection error counts, here as the difference of the inverse depths times the
+    pixels per unit, its first order. Beyond a few pixels it matters on which side the
+    source's surface lies: a plane behind it may be hidden in that source, which costs
+    little more than a bad match; a plane in front of it would be seen there (free
+    space, Merrell et al., ICCV 2007).
 
     Args:
         match_cost: 1 - NCC, in 0..2, or `OUTSIDE`.
@@ -53,12 +56,12 @@ def geometric_cost(match_cost, x, y, w, sources, s):
     if match_cost == OUTSIDE:
         return OUTSIDE
     cost = min(match_cost, WORST_MATCH)
-    A, b = sources.A, sources.b
-    u2 = A[s, 2, 0] * x + A[s, 2, 1] * y + A[s, 2, 2] + b[s, 2] * w
+    b = sources.b
+    u2 = project(x, y, w, sources, s, 2)
     if u2 < SMALL:
         return cost
-    xc = (A[s, 0, 0] * x + A[s, 0, 1] * y + A[s, 0, 2] + b[s, 0] * w) / u2
-    yc = (A[s, 1, 0] * x + A[s, 1, 1] * y + A[s, 1, 2] + b[s, 1] * w) / u2
+    xc = project(x, y, w, sources, s, 0) / u2
+    yc = project(x, y, w, sources, s, 1) / u2
     column = np.int64(xc + np.float32(0.5))
     row = np.int64(yc + np.float32(0.5))
     seen = sources.inverse_depths[

@@ -17,8 +17,8 @@ warnings.simplefilter("error", NumbaWarning)
 
 @numba.njit(parallel=True)
 def doubled(values):
-    for place in numba.prange(values.size):
-        values[place] *= 2.0
+    for index in numba.prange(values.size):
+        values[index] *= 2.0
 
 values = np.ones(100)
 doubled(values)

@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from resdepth_colmap.matching.cost import OUTSIDE, Sources
+from resdepth_colmap.matching.cost import OUTSIDE
+from resdepth_colmap.matching.views import Sources
 from resdepth_colmap.matching.visibility import (
     HIDDEN,
     UNSEEN,

@@ -15,8 +15,10 @@ from numba import njit
 
 from resdepth_colmap.config import StereoConfig
 from resdepth_colmap.matching import patch_match, sweeps
-from resdepth_colmap.matching.cost import plane_cost, reference_window
+from resdepth_colmap.matching.cost import make_window, plane_cost, reference_patch
 from resdepth_colmap.matching.patch_match import MatchView
+from resdepth_colmap.matching.plane import Plane
+from resdepth_colmap.matching.views import blur_levels, pack_sources
 
 _CACHED_PX = 32
 _NUM_CALLS = 200_000
@@ -25,7 +27,7 @@ _NUM_REPEATS = 3
 
 
 class CountedSources(NamedTuple):
-    """`matching.cost.Sources`, and how often a plane was looked at in one of them."""
+    """`matching.views.Sources`, and how often a plane was looked at in one of them."""
 
     A: npt.NDArray[np.float32]
     b: npt.NDArray[np.float32]
@@ -41,13 +43,16 @@ def counting_sweep():
     counted_cost = sweeps._view_cost
 
     @njit(fastmath=True)
-    def counting_cost(x, y, w, gx, gy, sources, *rest):
+    def counting_cost(plane, patch, window, sources, s, geometric):
         sources.num_evaluations[0] += 1
-        return counted_cost(x, y, w, gx, gy, sources, *rest)
+        return counted_cost(plane, patch, window, sources, s, geometric)
 
-    kernel = sweeps.sweep.py_func
-    names = {**kernel.__globals__, "_view_cost": counting_cost}
-    return njit(fastmath=True)(types.FunctionType(kernel.__code__, names))
+    # The steps of the sweep are kernels too: all are made anew around that cost.
+    names = {**vars(sweeps), "_view_cost": counting_cost}
+    for name in ("_fill_cost_matrix", "_best_propagated", "_store_best", "sweep"):
+        code = getattr(sweeps, name).py_func.__code__
+        names[name] = njit(fastmath=True)(types.FunctionType(code, names))
+    return names["sweep"]
 
 
 def count_evaluations(
@@ -63,8 +68,8 @@ def count_evaluations(
     count = np.zeros(1, np.int64)
     kernel, original = counting_sweep(), sweeps.sweep
 
-    def counted(levels, K, planes, costs, sources, *rest):
-        kernel(levels, K, planes, costs, CountedSources(*sources, count), *rest)
+    def counted(reference, sources, *rest):
+        kernel(reference, CountedSources(*sources, count), *rest)
 
     # The matcher looks its kernel up in the module at each call.
     setattr(sweeps, "sweep", counted)  # noqa: B010 (mypy wants a kernel there)
@@ -79,17 +84,12 @@ def count_evaluations(
 @njit(cache=True, fastmath=True)
 def _repeated_costs(levels, sources, window, weights, values, num_calls):
     middle = levels.shape[1] // 2
-    x = np.float32(middle)
-    level, mean, variance = reference_window(
-        levels, middle, middle, window, weights, values
-    )
+    patch = reference_patch(levels, middle, middle, window, weights, values)
     total = np.float32(0)
     for i in range(num_calls):
         w = np.float32(0.25) + np.float32(1e-3) * np.float32(i % 16)
-        total += plane_cost(
-            x, x, w, np.float32(1e-4), np.float32(1e-4), sources, 0, level, window,
-            weights, values, mean, variance,
-        )  # fmt: skip
+        plane = Plane(w, np.float32(1e-4), np.float32(1e-4))
+        total += plane_cost(plane, patch, window, sources, 0)
     return total
 
 
@@ -99,10 +99,8 @@ def _repeated_windows(levels, window, weights, values, num_calls):
     total = np.float32(0)
     for i in range(num_calls):
         x = middle + i % 4
-        level, mean, variance = reference_window(
-            levels, x, middle, window, weights, values
-        )
-        total += level + mean + variance
+        patch = reference_patch(levels, x, middle, window, weights, values)
+        total += patch.level + patch.mean + patch.variance
     return total
 
 
@@ -118,17 +116,18 @@ def seconds_in_cache(config: StereoConfig) -> tuple[float, float]:
     pose[0, 3] = -0.1
     reference = MatchView(gray=gray, K=K, cam_from_world=np.eye(3, 4))
     source = MatchView(gray=gray, K=K, cam_from_world=pose)
-    flat = patch_match._flat_sources(reference, [source], None)
-    window = patch_match._window(config)
-    levels = patch_match._blurred(gray)
+    projections = patch_match._projections(reference, [source])
+    packed = pack_sources(*projections, [gray], None)
+    window = make_window(config)
+    levels = blur_levels(gray)
     weights = np.empty(len(window.dx), np.float32)
     values = np.empty(len(window.dx), np.float32)
 
-    def costs(number):
-        _repeated_costs(levels, flat, window, weights, values, number)
+    def costs(num_calls):
+        _repeated_costs(levels, packed, window, weights, values, num_calls)
 
-    def windows(number):
-        _repeated_windows(levels, window, weights, values, number)
+    def windows(num_calls):
+        _repeated_windows(levels, window, weights, values, num_calls)
 
     return _seconds_a_call(costs), _seconds_a_call(windows)
 

@@ -31,8 +31,9 @@ def main() -> None:
     logging.basicConfig(level=logging.INFO, format="%(message)s")
     import numba
 
-    from resdepth_colmap.matching import sweeps  # noqa: F401 (the threading layer)
+    from resdepth_colmap.matching.compilation import choose_threading_layer
 
+    choose_threading_layer()
     numba.set_num_threads(1)
     folders = Folders(data=arguments.data, cache=arguments.cache / f"method_{METHOD}")
     for name in arguments.only:

@@ -43,8 +43,8 @@ def test_window_costs_take_time_wherever_the_data_lie() -> None:
 
 @pytest.mark.slow
 def test_no_more_planes_are_counted_than_the_method_can_look_at() -> None:
-    from resdepth_colmap.matching.perturbation import NUM_TRIALS
-    from resdepth_colmap.matching.propagation import NUM_STATES
+    from resdepth_colmap.matching.propagation import NUM_PROPAGATED
+    from resdepth_colmap.matching.random_planes import NUM_PERTURBED
     from scripts.benchmarks.matching.bounds import count_evaluations
 
     views = noise_views(0.002, 2)
@@ -54,4 +54,4 @@ def test_no_more_planes_are_counted_than_the_method_can_look_at() -> None:
     ]
     units = views[0].gray.size * 2
     assert units * 2 < counts[0] < counts[1]
-    assert counts[1] <= units * (2 + 2 * (NUM_STATES + NUM_TRIALS))
+    assert counts[1] <= units * (2 + 2 * (NUM_PROPAGATED + NUM_PERTURBED))

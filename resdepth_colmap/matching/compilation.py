@@ -1,4 +1,4 @@
-"""numba's cache of compiled kernels, kept true."""
+"""How numba compiles the kernels and runs their threads."""
 
 import contextlib
 from pathlib import Path
@@ -19,3 +19,17 @@ def forget_stale_kernels(folder: Path) -> None:
         with contextlib.suppress(OSError):
             if index.stat().st_mtime_ns < newest:
                 index.unlink()
+
+
+def choose_threading_layer() -> None:
+    """Let numba try OpenMP first; otherwise it tries TBB, and warns of an old one.
+
+    A module with parallel kernels calls this before it defines them.
+    """
+    import numba  # slow import
+
+    numba.config.THREADING_LAYER_PRIORITY = [  # type: ignore[attr-defined] # at run time
+        "omp",
+        "tbb",
+        "workqueue",
+    ]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from resdepth_colmap.matching.kernel_cache import forget_stale_kernels
+from resdepth_colmap.matching.compilation import forget_stale_kernels
 
 INNER = "FACTOR = {}\n"
 OUTER = """
@@ -26,7 +26,7 @@ def write(folder: Path, factor: int, mtime: int) -> None:
     folder.mkdir(exist_ok=True)
     init = (
         "from pathlib import Path\n"
-        "from resdepth_colmap.matching.kernel_cache import forget_stale_kernels\n"
+        "from resdepth_colmap.matching.compilation import forget_stale_kernels\n"
         "forget_stale_kernels(Path(__file__).parent)\n"
     )
     files = {"__init__": init, "inner": INNER.format(factor), "outer": OUTER}
