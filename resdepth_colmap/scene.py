@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -84,11 +85,24 @@ class View:
     @property
     def center_in_world(self) -> Matrix:
         """The camera's projection centre, shape (3,), in workspace units."""
-        return -self.cam_from_world[:, :3].T @ self.cam_from_world[:, 3]
+        return projection_center(self.cam_from_world)
 
 
-def cam_from_cam(target: View, source: View) -> Matrix:
-    """The pose target_from_source, shape (3, 4), float64."""
+class Posed(Protocol):
+    """Anything with a camera pose."""
+
+    @property
+    def cam_from_world(self) -> Matrix:
+        """Pose, shape (3, 4), float64: xyz_in_cam = R xyz_in_world + t."""
+
+
+def projection_center(cam_from_world: Matrix) -> Matrix:
+    """The projection centre of a pose (3, 4), in the frame it maps from, shape (3,)."""
+    return -cam_from_world[:, :3].T @ cam_from_world[:, 3]
+
+
+def cam_from_cam(target: Posed, source: Posed) -> Matrix:
+    """The relative pose target_from_source, shape (3, 4), float64."""
     rotation = target.cam_from_world[:, :3] @ source.cam_from_world[:, :3].T
     translation = target.cam_from_world[:, 3] - rotation @ source.cam_from_world[:, 3]
     return np.column_stack([rotation, translation])

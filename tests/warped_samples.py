@@ -3,11 +3,9 @@
 import numpy as np
 import torch
 
-from resdepth_colmap.evaluation.datasets.sample import (
-    DepthSample,
-    source_from_reference,
-)
+from resdepth_colmap.evaluation.datasets.sample import DepthSample
 from resdepth_colmap.geometry.warp import warp_to_reference
+from resdepth_colmap.scene import cam_from_cam
 
 
 def difference_when_warped(sample: DepthSample, scale: float = 1.0) -> float:
@@ -20,7 +18,7 @@ def difference_when_warped(sample: DepthSample, scale: float = 1.0) -> float:
         torch.from_numpy(inverse_depth.astype(np.float64))[None, None],
         torch.from_numpy(sample.reference.K)[None],
         torch.from_numpy(source.K)[None],
-        torch.from_numpy(source_from_reference(sample.reference, source))[None],
+        torch.from_numpy(cam_from_cam(source, sample.reference))[None],
     )
     counted = known & inside[0, 0].numpy()
     difference = np.abs(warped[0, 0].numpy() - sample.reference.gray)[counted]

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from resdepth_colmap.geometry.pixels import CENTER_PX, index_K
 from resdepth_colmap.geometry.projection import pixel_rays, project, transform
-from resdepth_colmap.scene import Camera, Matrix, View, cam_from_cam
+from resdepth_colmap.scene import Camera, Matrix, View, cam_from_cam, projection_center
 
 GRID_SIDE = 9
 
@@ -50,7 +50,7 @@ def overlap(reference: View, source: View, depths: npt.ArrayLike) -> Overlap:
     xyz_in_source = transform(source_from_reference, xyz)
     xy, z = project(xyz_in_source, K)
     inside = (z > 0) & _in_image(xy, source.camera)
-    center = -source_from_reference[:, :3].T @ source_from_reference[:, 3]
+    center = projection_center(source_from_reference)
     angle_deg = _angle_deg(xyz, xyz - center)
     xy_far, z_far = project(rays @ source_from_reference[:, :3].T, K)
     shift = np.linalg.norm(xy - xy_far, axis=-1)

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from resdepth_colmap.config import StereoConfig
 from resdepth_colmap.matching.patch_match import MatchResult, MatchView, Surface
-from resdepth_colmap.scene import DepthMap, Matrix
+from resdepth_colmap.scene import DepthMap, cam_from_cam
 
 _NO_DEPTH = np.zeros((0, 0), np.float32)
 
@@ -69,7 +69,7 @@ def filter_result(
             reference.K,
             np.ascontiguousarray(result.source_costs[index]),
             source.K,
-            _source_from_reference(source, reference),
+            cam_from_cam(source, reference),
             _NO_DEPTH if source_depths is None else source_depths[index],
             limits,
             agrees[index],
@@ -80,11 +80,3 @@ def filter_result(
     depth = np.where(kept, result.depth, np.float32(0))
     normals = np.where(kept[..., np.newaxis], result.normals, np.float32(0))
     return Filtered(Surface(depth=depth, normals=normals), agrees)
-
-
-def _source_from_reference(source: MatchView, reference: MatchView) -> Matrix:
-    rotation = source.cam_from_world[:, :3] @ reference.cam_from_world[:, :3].T
-    translation = (
-        source.cam_from_world[:, 3] - rotation @ reference.cam_from_world[:, 3]
-    )
-    return np.column_stack([rotation, translation])

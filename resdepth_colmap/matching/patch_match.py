@@ -15,7 +15,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from resdepth_colmap.config import StereoConfig
-from resdepth_colmap.scene import DepthMap, FloatMap, GrayImage, Matrix, NormalMap
+from resdepth_colmap.scene import (
+    DepthMap,
+    FloatMap,
+    GrayImage,
+    Matrix,
+    NormalMap,
+    cam_from_cam,
+)
 
 if TYPE_CHECKING:
     from resdepth_colmap.matching.cost import Sources, Window
@@ -192,15 +199,11 @@ def _projections(
     reference: MatchView, sources: Sequence[MatchView]
 ) -> tuple[FloatMap, FloatMap]:
     """A (S, 3, 3) and b (S, 3): source pixel ~ A (x, y, 1) + b inverse_depth."""
-    rotation_from_world = reference.cam_from_world[:, :3]
     A, b = [], []
     for source in sources:
-        rotation = source.cam_from_world[:, :3] @ rotation_from_world.T
-        translation = (
-            source.cam_from_world[:, 3] - rotation @ reference.cam_from_world[:, 3]
-        )
-        A.append(source.K @ rotation @ np.linalg.inv(reference.K))
-        b.append(source.K @ translation)
+        pose = cam_from_cam(source, reference)
+        A.append(source.K @ pose[:, :3] @ np.linalg.inv(reference.K))
+        b.append(source.K @ pose[:, 3])
     return np.array(A, np.float32), np.array(b, np.float32)
 
 

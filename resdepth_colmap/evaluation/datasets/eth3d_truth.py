@@ -16,7 +16,7 @@ from resdepth_colmap.geometry.projection import transform
 from resdepth_colmap.geometry.splat import splat_depth
 from resdepth_colmap.io.distorted_camera import DistortedView
 from resdepth_colmap.io.eth3d import Eth3dScene, read_evaluated, read_raw_depth
-from resdepth_colmap.scene import Camera, DepthMap, Matrix, View
+from resdepth_colmap.scene import Camera, DepthMap, Matrix, View, cam_from_cam
 
 _PIXELS_AT_ONCE = 1 << 21
 _LARGEST_ANGLE_DEG = 0.5
@@ -48,7 +48,7 @@ def undistorted_truth(
     for path in scene.mask_paths(file_name):
         if path.is_file():
             depth *= read_evaluated(path, width_px, height_px)
-    chunks = _points(depth, distorted, _view_from(distorted, view))
+    chunks = _points(depth, distorted, cam_from_cam(view, distorted))
     return splat_depth(chunks, index_K(camera), camera.height_px, camera.width_px)
 
 
@@ -66,17 +66,8 @@ def _points(
         yield transform(view_from_distorted, xyz)
 
 
-def _view_from(distorted: DistortedView, view: View) -> Matrix:
-    """The pose view_from_distorted, shape (3, 4)."""
-    pose = distorted.cam_from_world
-    rotation = view.cam_from_world[:, :3] @ pose[:, :3].T
-    return np.column_stack(
-        [rotation, view.cam_from_world[:, 3] - rotation @ pose[:, 3]]
-    )
-
-
 def _check_poses(scene: Eth3dScene, distorted: DistortedView, view: View) -> None:
-    pose = _view_from(distorted, view)
+    pose = cam_from_cam(view, distorted)
     cosine = np.clip((np.trace(pose[:, :3]) - 1) / 2, -1, 1)
     angle_deg = float(np.degrees(np.arccos(cosine)))
     shift = float(np.linalg.norm(pose[:, 3]))

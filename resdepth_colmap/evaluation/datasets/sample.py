@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from resdepth_colmap.config import StereoConfig
 from resdepth_colmap.matching.patch_match import MatchView
-from resdepth_colmap.scene import DepthMap, Matrix, UnitColors
+from resdepth_colmap.scene import DepthMap, UnitColors
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
@@ -90,10 +90,3 @@ class SceneSource:
 
     name: str
     read: Callable[[SampleOptions], Sequence[LazySample]]
-
-
-def source_from_reference(reference: MatchView, source: MatchView) -> Matrix:
-    """The pose of a source, shape (3, 4), in units."""
-    rotation = source.cam_from_world[:, :3] @ reference.cam_from_world[:, :3].T
-    moved = rotation @ reference.cam_from_world[:, 3]
-    return np.column_stack([rotation, source.cam_from_world[:, 3] - moved])

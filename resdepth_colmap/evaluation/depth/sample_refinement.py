@@ -8,13 +8,12 @@ from resdepth_colmap.config import RefineConfig
 from resdepth_colmap.evaluation.datasets.sample import (
     DepthSample,
     InitialDepth,
-    source_from_reference,
 )
 from resdepth_colmap.matching.patch_match import MatchView
 from resdepth_colmap.network.unet import ResDepthNet
 from resdepth_colmap.pipeline.refine.cross_view import NUM_SOURCE_MAPS, SourceMap
 from resdepth_colmap.pipeline.refine.view import SourceView, ViewInputs, refine_view
-from resdepth_colmap.scene import DepthMap, UnitColors
+from resdepth_colmap.scene import DepthMap, UnitColors, cam_from_cam
 
 
 class RefinedSample(NamedTuple):
@@ -102,7 +101,7 @@ def _inputs(
             SourceView(
                 gray=source.gray,
                 K=source.K,
-                source_from_reference=source_from_reference(own.view, source),
+                source_from_reference=cam_from_cam(source, own.view),
             )
             for source in others
         ),
@@ -110,9 +109,7 @@ def _inputs(
             SourceMap(
                 depth=depth,
                 K=views[place].view.K,
-                source_from_reference=source_from_reference(
-                    own.view, views[place].view
-                ),
+                source_from_reference=cam_from_cam(views[place].view, own.view),
             )
             for place, depth in maps.items()
             if depth is not None

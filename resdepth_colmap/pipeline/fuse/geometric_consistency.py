@@ -18,7 +18,7 @@ import numpy.typing as npt
 from resdepth_colmap.config import FuseConfig
 from resdepth_colmap.io.point_cloud import PointCloud
 from resdepth_colmap.pipeline.fuse.views import Flags, FuseView, Indices
-from resdepth_colmap.scene import FloatMap, Matrix, NormalMap
+from resdepth_colmap.scene import FloatMap, Matrix, NormalMap, cam_from_cam
 
 _PIXELS_AT_ONCE = 1 << 19  # bounds the memory of what is computed for each pixel
 
@@ -142,7 +142,7 @@ class _Chunk:
 
     def compare(self, index: int, other: FuseView) -> None:
         """Look for the pixels in another view."""
-        other_from_here = _cam_from_cam(other.cam_from_world, self.reference)
+        other_from_here = cam_from_cam(other, self.reference).astype(np.float32)
         seen, there = self._look_up(other, other_from_here)
         self.num_seen[seen] += 1
         depth = other.depth.ravel()[there]
@@ -232,13 +232,6 @@ class _Explained:
         flags = self.of(index, num_pixels)
         flags[pixels] = True
         self._bits[index] = np.packbits(flags)
-
-
-def _cam_from_cam(target_from_world: Matrix, source: FuseView) -> FloatMap:
-    """The pose target_from_source, shape (3, 4), float32: see _Chunk."""
-    rotation = target_from_world[:, :3] @ source.cam_from_world[:, :3].T
-    translation = target_from_world[:, 3] - rotation @ source.cam_from_world[:, 3]
-    return np.column_stack([rotation, translation]).astype(np.float32)
 
 
 def _xy(pixels: Indices, width_px: int) -> FloatMap:

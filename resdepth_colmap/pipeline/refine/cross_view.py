@@ -12,7 +12,7 @@ from resdepth_colmap.geometry.completion import complete_from_background
 from resdepth_colmap.geometry.forward_warp import reproject_inverse_depth
 from resdepth_colmap.geometry.inverse_depth import invert_map
 from resdepth_colmap.pipeline.refine.network_inputs import initial_maps
-from resdepth_colmap.scene import DepthMap, FloatMap, Matrix
+from resdepth_colmap.scene import DepthMap, FloatMap, Matrix, projection_center
 
 FILTERED_SHARE = 0.95
 """A map with less of its pixels filled has been filtered."""
@@ -159,7 +159,7 @@ def goes_along_rows(source: SourceMap, K: Matrix, size_px: tuple[int, int]) -> b
         size_px: Height and width of the reference; its middle decides.
     """
     pose = source.source_from_reference
-    epipole = K @ (-pose[:, :3].T @ pose[:, 3])
+    epipole = K @ projection_center(pose)
     middle_x, middle_y = (size_px[1] - 1) / 2, (size_px[0] - 1) / 2
     along_x = epipole[0] - epipole[2] * middle_x
     along_y = epipole[1] - epipole[2] * middle_y
