@@ -5,16 +5,16 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-import cv2
 import numpy as np
 
+from resdepth_colmap.geometry.resize import nearest_resized
 from resdepth_colmap.io.colmap.depth_map import read_depth_map
 from resdepth_colmap.io.colmap.output import OutputWorkspace
 from resdepth_colmap.io.images import read_rgb, write_png
 from resdepth_colmap.pipeline.initial_map import map_path
 from resdepth_colmap.pipeline.refine.stage import RefineReport
 from resdepth_colmap.progress import Progress
-from resdepth_colmap.scene import ColorImage, DepthMap, Scene
+from resdepth_colmap.scene import ColorImage, Scene
 from resdepth_colmap.viz.canvas import (
     BAR_HEIGHT_PX,
     BAR_LABEL_HEIGHT_PX,
@@ -189,14 +189,8 @@ def _load(output: OutputWorkspace, report: RefineReport, name: str) -> BeforeAft
     before = read_depth_map(map_path(source, name, report.images[name]["input"]))
     after = read_depth_map(output.depth_map_path(name))
     truth_path = source.truth_path(name)
-    truth = read_depth_map(truth_path) if truth_path.is_file() else None
-    if truth is not None and truth.shape != before.shape:
-        truth = _nearest(truth, before.shape)
+    truth = None
+    if truth_path.is_file():
+        truth = nearest_resized(read_depth_map(truth_path), before.shape[::-1])
     rgb = read_rgb(source.image_path(name))
     return BeforeAfter(name=name, rgb=rgb, before=before, after=after, truth=truth)
-
-
-def _nearest(depth: DepthMap, shape: tuple[int, ...]) -> DepthMap:
-    size = (shape[1], shape[0])
-    smaller = cv2.resize(depth, size, interpolation=cv2.INTER_NEAREST)
-    return np.asarray(smaller, np.float32)

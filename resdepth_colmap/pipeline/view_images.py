@@ -4,9 +4,9 @@ import collections
 from collections.abc import Callable, Hashable
 from pathlib import Path
 
-import cv2
 import numpy as np
 
+from resdepth_colmap.geometry.resize import area_resized, nearest_resized
 from resdepth_colmap.io.colmap.depth_map import read_depth_map
 from resdepth_colmap.io.colmap.workspace import Workspace, original_map_path
 from resdepth_colmap.io.images import read_gray, read_unit_colors
@@ -92,7 +92,7 @@ class ViewImages:
             WorkspaceError: If the image is missing or cannot be read.
         """
         colors = read_unit_colors(self.workspace.image_path(view.name))
-        return resized_image(colors, (camera.width_px, camera.height_px))
+        return area_resized(colors, (camera.width_px, camera.height_px))
 
     def depth(self, view: View, camera: Camera, kind: str) -> DepthMap:
         """A depth map of a view, at the size of `camera`, float32; 0 = no depth.
@@ -118,31 +118,13 @@ class ViewImages:
 
     def _load_gray(self, view: View, size: Size) -> GrayImage:
         gray = read_gray(self.workspace.image_path(view.name))
-        return resized_image(gray, size)
+        return area_resized(gray, size)
 
     def _load_depth(self, view: View, size: Size, kind: str) -> DepthMap:
         path = self.workspace.depth_map_path(view.name, kind)
         if not path.is_file():
             return np.zeros(size[::-1], np.float32)
-        depth = read_depth_map(path)
-        return depth if depth.shape == size[::-1] else nearest_resized(depth, size)
-
-
-def resized_image(values: FloatMap, size: Size) -> FloatMap:
-    """An image, grey or in colour, at that (width, height).
-
-    Each pixel is the mean of what it covers: a smaller image shows no false patterns.
-    """
-    if values.shape[:2] == size[::-1]:
-        return values
-    result = cv2.resize(values, size, interpolation=cv2.INTER_AREA)
-    return np.asarray(result, dtype=np.float32)
-
-
-def nearest_resized(values: FloatMap, size: Size) -> FloatMap:
-    """A map at another (width, height), each pixel the nearest one of the map's."""
-    result = cv2.resize(values, size, interpolation=cv2.INTER_NEAREST_EXACT)
-    return np.asarray(result, dtype=np.float32)
+        return nearest_resized(read_depth_map(path), size)
 
 
 def camera_at_scale(camera: Camera, scale: float) -> Camera:

@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from resdepth_colmap.errors import WorkspaceError
+from resdepth_colmap.geometry.resize import nearest_resized
 from resdepth_colmap.io.colmap.depth_map import read_depth_map
 from resdepth_colmap.io.colmap.output import OutputWorkspace
 from resdepth_colmap.io.images import read_rgb
@@ -37,13 +38,13 @@ class ImageMaps:
     def sampled(self, num_pixels: float) -> "ImageMaps":
         """The maps with at most so many pixels; each is one of the full map's."""
         height_px, width_px = smaller_size(self.before.shape, num_pixels)
-        size = (height_px, width_px)
+        size = (width_px, height_px)
         return dataclasses.replace(
             self,
-            before=nearest_sampled(self.before, size),
-            after=nearest_sampled(self.after, size),
-            confidence=_nearest_or_none(self.confidence, size),
-            truth=_nearest_or_none(self.truth, size),
+            before=nearest_resized(self.before, size),
+            after=nearest_resized(self.after, size),
+            confidence=_resized_or_none(self.confidence, size),
+            truth=_resized_or_none(self.truth, size),
         )
 
 
@@ -81,7 +82,7 @@ def load_maps(output: OutputWorkspace, name: str, kind: str) -> ImageMaps:
     truth = None
     truth_path = source.truth_path(name)
     if truth_path.is_file():
-        truth = nearest_sampled(read_depth_map(truth_path), after.shape)
+        truth = nearest_resized(read_depth_map(truth_path), after.shape[::-1])
     return ImageMaps(
         name=name,
         rgb=read_rgb(source.image_path(name)),
@@ -99,21 +100,10 @@ def smaller_size(shape: tuple[int, ...], num_pixels: float) -> tuple[int, int]:
     return max(1, math.floor(height_px * scale)), max(1, math.floor(width_px * scale))
 
 
-def nearest_sampled(values: FloatMap, shape: tuple[int, ...]) -> FloatMap:
-    """A map of another size whose values are the old ones nearest to its pixels."""
-    if values.shape == shape:
-        return values
-    rows, columns = (
-        ((np.arange(new) + 0.5) * old / new).astype(np.int64)
-        for old, new in zip(values.shape, shape[:2], strict=True)
-    )
-    return values[np.ix_(rows, columns)]
-
-
-def _nearest_or_none(
-    values: FloatMap | None, shape: tuple[int, int]
+def _resized_or_none(
+    values: FloatMap | None, size_px: tuple[int, int]
 ) -> FloatMap | None:
-    return None if values is None else nearest_sampled(values, shape)
+    return None if values is None else nearest_resized(values, size_px)
 
 
 def _size(values: npt.NDArray[np.float32]) -> str:

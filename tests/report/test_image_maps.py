@@ -13,7 +13,7 @@ from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.io.colmap.depth_map import write_depth_map
 from resdepth_colmap.io.colmap.output import OutputWorkspace
 from resdepth_colmap.io.colmap.workspace import open_workspace
-from resdepth_colmap.report.image_maps import load_maps, nearest_sampled, smaller_size
+from resdepth_colmap.report.image_maps import load_maps, smaller_size
 
 SIZES = st.integers(1, 300)
 
@@ -25,19 +25,6 @@ def test_a_smaller_size_keeps_to_the_limit_and_grows_nothing(
     small = smaller_size((height, width), most)
     assert 1 <= small[0] <= height and 1 <= small[1] <= width
     assert small[0] * small[1] <= max(most, height, width)
-
-
-@hypothesis.given(height=SIZES, width=SIZES, rows=SIZES, columns=SIZES)
-def test_each_sampled_pixel_is_one_of_the_map_and_lies_at_its_place(
-    height: int, width: int, rows: int, columns: int
-) -> None:
-    y, x = np.mgrid[:height, :width]
-    sampled = nearest_sampled((1000 * y + x).astype(np.float32), (rows, columns))
-    row, column = np.divmod(sampled.astype(np.int64), 1000)
-    expected_y = (np.arange(rows)[:, None] + 0.5) * height / rows
-    expected_x = (np.arange(columns)[None] + 0.5) * width / columns
-    assert (np.abs(row + 0.5 - expected_y) <= 0.501).all()
-    assert (np.abs(column + 0.5 - expected_x) <= 0.501).all()
 
 
 def _output(path: Path) -> OutputWorkspace:

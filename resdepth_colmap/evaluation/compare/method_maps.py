@@ -8,9 +8,10 @@ import numpy.typing as npt
 
 from resdepth_colmap.evaluation.compare.methods import Method
 from resdepth_colmap.geometry.pixels import index_K
+from resdepth_colmap.geometry.resize import nearest_resized
 from resdepth_colmap.io.colmap.depth_map import read_depth_map
 from resdepth_colmap.pipeline.fuse.views import MapFiles
-from resdepth_colmap.pipeline.view_images import ArrayCache, nearest_resized
+from resdepth_colmap.pipeline.view_images import ArrayCache
 from resdepth_colmap.scene import DepthMap, Matrix, View
 
 MAX_NUM_BYTES = 512 << 20
@@ -72,10 +73,7 @@ class MethodMaps(Sequence[ViewMaps]):
             view=view,
             K=index_K(view.camera.resized(width_px, height_px)),
             depths={
-                name: depth
-                if depth.shape == size[::-1]
-                else nearest_resized(depth, size)
-                for name, depth in depths.items()
+                name: nearest_resized(depth, size) for name, depth in depths.items()
             },
         )
 

@@ -17,10 +17,11 @@ from resdepth_colmap.evaluation.metrics.reference_free import (
     sparse_points,
 )
 from resdepth_colmap.evaluation.metrics.rewarped_photos import photo_agreement
+from resdepth_colmap.geometry.resize import nearest_resized
 from resdepth_colmap.geometry.view_selection import choose_sources
 from resdepth_colmap.io.colmap.sparse_points import SparsePoints
 from resdepth_colmap.pipeline.refine.load_view import view_inputs
-from resdepth_colmap.pipeline.view_images import ViewImages, nearest_resized
+from resdepth_colmap.pipeline.view_images import ViewImages
 from resdepth_colmap.progress import Progress
 from resdepth_colmap.scene import DepthMap, Scene
 
@@ -68,8 +69,6 @@ class Witnesses:
             return None
         for true_map in self.truth.maps:
             if true_map.view.name == maps.view.name:
-                if true_map.depth.shape == maps.shape:
-                    return true_map.depth
                 return nearest_resized(true_map.depth, maps.shape[::-1])
         return None
 

@@ -28,6 +28,7 @@ from resdepth_colmap.evaluation.datasets.sample import (
 )
 from resdepth_colmap.geometry.depth_range import depth_range
 from resdepth_colmap.geometry.pixels import index_K
+from resdepth_colmap.geometry.resize import area_resized
 from resdepth_colmap.io.colmap.model import read_scene
 from resdepth_colmap.io.distorted_camera import DistortedView, read_distorted_views
 from resdepth_colmap.io.eth3d import (
@@ -39,7 +40,7 @@ from resdepth_colmap.io.eth3d import (
 )
 from resdepth_colmap.io.images import read_gray, read_unit_colors
 from resdepth_colmap.matching.patch_match import MatchView
-from resdepth_colmap.pipeline.view_images import camera_at_scale, resized_image
+from resdepth_colmap.pipeline.view_images import camera_at_scale
 from resdepth_colmap.scene import Camera, Scene, UnitColors, View
 
 
@@ -186,7 +187,7 @@ class _SceneReader:
     def _colors(self, view: View) -> UnitColors:
         camera = self._camera(view)
         colors = read_unit_colors(self.files.image_path(view.name))
-        return resized_image(colors, (camera.width_px, camera.height_px))
+        return area_resized(colors, (camera.width_px, camera.height_px))
 
     def _match_view(self, view: View) -> MatchView:
         path = self.files.image_path(view.name)
@@ -200,7 +201,7 @@ class _SceneReader:
             )
         camera = self._camera(view)
         return MatchView(
-            gray=resized_image(gray, (camera.width_px, camera.height_px)),
+            gray=area_resized(gray, (camera.width_px, camera.height_px)),
             K=index_K(camera),
             cam_from_world=view.cam_from_world,
         )

@@ -16,7 +16,7 @@ from resdepth_colmap.evaluation.datasets.sample import (
 )
 from resdepth_colmap.geometry.depth_range import depth_range
 from resdepth_colmap.geometry.pixels import index_K
-from resdepth_colmap.geometry.resize import nearest_depth
+from resdepth_colmap.geometry.resize import nearest_resized
 from resdepth_colmap.geometry.view_selection import choose_sources
 from resdepth_colmap.io.colmap.cfg import SourceKind, read_sources
 from resdepth_colmap.io.colmap.depth_map import read_depth_map
@@ -156,8 +156,8 @@ def _map_of(workspace: Workspace, view: View) -> DepthMap | None:
     if not kinds:
         return None
     found = choose_initial_map(workspace, view.name, view.camera, kinds)
-    size_px = (view.camera.height_px, view.camera.width_px)
-    return nearest_depth(read_depth_map(found.path), size_px)
+    size_px = (view.camera.width_px, view.camera.height_px)
+    return nearest_resized(read_depth_map(found.path), size_px)
 
 
 def _check_shape(path: Path, shape: tuple[int, ...], view: View) -> None:

@@ -5,7 +5,6 @@ The mask of `images/a/b.jpg` is `MASKS/a/b.jpg.png`; its pixels of value 0 are l
 
 from pathlib import Path
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 
@@ -46,17 +45,13 @@ def check_masks(folder: Path, cameras: dict[str, Camera]) -> int:
     return len(found)
 
 
-def read_mask(path: Path, size_px: tuple[int, int]) -> Wanted:
-    """Read a mask at the (width, height) of a map: the nearest of its pixels each.
+def read_mask(path: Path) -> Wanted:
+    """Read a mask, at the size of its image.
 
     Raises:
         WorkspaceError: If the file is no image.
     """
-    wanted = (read_gray(path) > 0).astype(np.uint8)
-    if wanted.shape != size_px[::-1]:
-        resized = cv2.resize(wanted, size_px, interpolation=cv2.INTER_NEAREST_EXACT)
-        wanted = np.asarray(resized, np.uint8)
-    return wanted > 0
+    return np.asarray(read_gray(path) > 0)
 
 
 def _check_size(path: Path, camera: Camera) -> None:

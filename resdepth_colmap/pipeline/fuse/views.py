@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import overload
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 
 from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.geometry.normals import normals_from_depth
 from resdepth_colmap.geometry.pixels import index_K
+from resdepth_colmap.geometry.resize import area_resized
 from resdepth_colmap.io.colmap.depth_map import read_depth_map
 from resdepth_colmap.io.colmap.normal_map import read_normal_map
 from resdepth_colmap.io.images import read_rgb
@@ -92,18 +92,13 @@ class MapFiles:
         depth = read_depth_map(self.depth_path)
         height_px, width_px = depth.shape
         K = index_K(self.view.camera.resized(width_px, height_px))
-        rgb = read_rgb(self.image_path)
-        if rgb.shape[:2] != depth.shape:
-            size = (width_px, height_px)
-            resized = cv2.resize(rgb, size, interpolation=cv2.INTER_AREA)
-            rgb = np.asarray(resized, dtype=np.uint8)
         return FuseView(
             name=self.view.name,
             K=K,
             cam_from_world=self.view.cam_from_world,
             depth=depth,
             normals=self._normals(depth, K),
-            rgb=rgb,
+            rgb=area_resized(read_rgb(self.image_path), (width_px, height_px)),
             confidence=self._confidence(depth),
         )
 

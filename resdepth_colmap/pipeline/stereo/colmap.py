@@ -9,6 +9,7 @@ import numpy as np
 
 from resdepth_colmap.config import StereoConfig
 from resdepth_colmap.errors import WorkspaceError
+from resdepth_colmap.geometry.resize import nearest_resized
 from resdepth_colmap.io.colmap.cfg import (
     SourceKind,
     SourceSpec,
@@ -93,7 +94,7 @@ def _lay_mask(workspace: Workspace, config: StereoConfig, name: str, kind: str) 
     if not path.is_file():
         return
     depth = read_depth_map(depth_path)
-    wanted = read_mask(path, (depth.shape[1], depth.shape[0]))
+    wanted = nearest_resized(read_mask(path), depth.shape[::-1])
     write_depth_map(depth_path, np.where(wanted, depth, np.float32(0)))
     normal_path = workspace.normal_map_path(name, kind)
     if normal_path.is_file():

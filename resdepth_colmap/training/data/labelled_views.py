@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from resdepth_colmap.config import StereoConfig
-from resdepth_colmap.geometry.resize import nearest_depth
+from resdepth_colmap.geometry.resize import nearest_resized
 from resdepth_colmap.geometry.view_selection import choose_sources
 from resdepth_colmap.io.colmap.depth_map import read_depth_map
 from resdepth_colmap.io.colmap.model import read_scene
@@ -108,7 +108,7 @@ class LabelledView:
         view = self.scene.views[self.index]
         check_map_size(self.map_path, view.camera)
         depth = read_depth_map(self.map_path)
-        truth = nearest_depth(read_depth_map(self.truth_path), depth.shape)
+        truth = nearest_resized(read_depth_map(self.truth_path), depth.shape[::-1])
         if not _is_usable(depth, truth):
             return None
         choices = choose_sources(self.scene, self.index, num_sources)

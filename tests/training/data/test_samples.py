@@ -10,7 +10,7 @@ from planes import NAMES
 
 from resdepth_colmap.config import StereoConfig
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.geometry.resize import nearest_depth
+from resdepth_colmap.geometry.resize import nearest_resized
 from resdepth_colmap.io.colmap.depth_map import read_depth_map, write_depth_map
 from resdepth_colmap.network.network_config import InputVariant, NetworkConfig
 from resdepth_colmap.training.data import labelled_views as labelled_views_module
@@ -109,7 +109,7 @@ def test_a_map_of_a_failed_pair_is_not_used(tmp_path: Path) -> None:
 def test_a_smaller_map_has_a_smaller_sample_with_the_same_truth(tmp_path: Path) -> None:
     scene = write_noisy_plane(tmp_path / "room", wrong_share=0.0)
     for path in (scene / "stereo" / "depth_maps").rglob("*.bin"):
-        write_depth_map(path, nearest_depth(read_depth_map(path), (30, 40)))
+        write_depth_map(path, nearest_resized(read_depth_map(path), (40, 30)))
     for path in prepare_samples([scene], NETWORK, tmp_path / "cache"):
         sample = read_sample(path)
         assert sample.target.shape == sample.guidance.shape[1:] == (30, 40)
