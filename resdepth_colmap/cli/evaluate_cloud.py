@@ -63,7 +63,7 @@ def cloud(
     """
     config = build_config(CloudConfig, values)
     from resdepth_colmap.cli.log import BarProgress
-    from resdepth_colmap.evaluation.cloud.files import score_cloud_file
+    from resdepth_colmap.evaluation.cloud.laser_truth import score_cloud_file
     from resdepth_colmap.io.files import write_whole
 
     scores = score_cloud_file(reconstruction, ground_truth, config, BarProgress())

@@ -11,8 +11,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from resdepth_colmap.evaluation.cloud.reference_cloud import (
-    DepthTruth,
-    read_depth_truth,
+    ReferenceCloud,
+    read_reference_cloud,
 )
 from resdepth_colmap.evaluation.cloud.scores import CloudScores
 from resdepth_colmap.evaluation.compare.config import CompareConfig
@@ -202,7 +202,7 @@ def compare_workspace(
     output = OutputWorkspace(source=workspace, in_place=in_place)
     found = find_methods(output, scene, config)
     _check_images(output, scene, found)
-    depth_truth = read_depth_truth(workspace, scene, config.tolerances)
+    depth_truth = read_reference_cloud(workspace, scene, config.tolerances)
     witnesses = Witnesses(
         scene=scene,
         images=ViewImages(workspace, IMAGE_CACHE_BYTES),
@@ -251,7 +251,7 @@ def _scored(
 def _notes(
     scene: Scene,
     truth: CloudTruth | None,
-    depth_truth: DepthTruth | None,
+    depth_truth: ReferenceCloud | None,
     views: Sequence[MeasuredView],
 ) -> list[str]:
     notes = []

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from resdepth_colmap.evaluation.cloud.reference_cloud import DepthTruth
+from resdepth_colmap.evaluation.cloud.reference_cloud import ReferenceCloud
 from resdepth_colmap.evaluation.compare.method_maps import MethodMaps, ViewMaps
 from resdepth_colmap.evaluation.compare.methods import REFINED
 from resdepth_colmap.evaluation.metrics.reference_free import (
@@ -61,7 +61,7 @@ class Witnesses:
     scene: Scene
     images: ViewImages
     points: SparsePoints
-    truth: DepthTruth | None = None
+    truth: ReferenceCloud | None = None
 
     def true_depth(self, maps: ViewMaps) -> DepthMap | None:
         """The true depth of a view at the size of its maps; None if not known."""
