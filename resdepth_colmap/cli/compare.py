@@ -12,7 +12,7 @@ from resdepth_colmap.config import FuseConfig
 from resdepth_colmap.evaluation.compare.config import FUSE_OPTIONS, CompareConfig
 
 if TYPE_CHECKING:
-    from resdepth_colmap.evaluation.compare.comparison import CloudTruth
+    from resdepth_colmap.evaluation.compare.result import GroundTruth
 
 _UNSAID = ("as_json", "output")  # they change no figure
 
@@ -87,7 +87,7 @@ def compare(
     config = build_config(CompareConfig, {**values, "fuse": fuse})
     from resdepth_colmap.cli.log import BarProgress
     from resdepth_colmap.cli.printed_comparison import show_workspace
-    from resdepth_colmap.evaluation.compare.comparisons import compare_workspaces
+    from resdepth_colmap.evaluation.compare.comparison import compare_workspaces
     from resdepth_colmap.io.files import write_whole
 
     report = compare_workspaces(
@@ -115,7 +115,7 @@ def compare(
         click.get_current_context().exit(1)
 
 
-def _truth(path: Path | None, config: CompareConfig) -> "CloudTruth | None":
+def _truth(path: Path | None, config: CompareConfig) -> "GroundTruth | None":
     if path is None:
         return None
     from resdepth_colmap.evaluation.cloud.config import CloudConfig

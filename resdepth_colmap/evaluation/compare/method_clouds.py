@@ -1,4 +1,4 @@
-"""The maps of an arm, fused: by us and by COLMAP, with the same thresholds."""
+"""The maps of each method, fused by open3d and by COLMAP with the same thresholds."""
 
 import dataclasses
 import tempfile
@@ -28,22 +28,22 @@ from resdepth_colmap.pipeline.fuse.views import MapFiles
 from resdepth_colmap.progress import Progress
 from resdepth_colmap.scene import Scene
 
-NO_POINTS = "no point survived the fusion: all scores are 0"
+NO_POINTS = "no point survived the fusion, so all scores are 0"
 NO_TRACKS = (
-    "COLMAP's fusion finds neighbouring images by the sparse points they share, and "
-    "the model has none: it would give no point, so it is left out"
+    "COLMAP's fusion finds neighbouring images by shared sparse points, and the model "
+    "has none: it would give no point, so it is left out"
 )
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class MethodCloud:
-    """The cloud of an arm.
+    """The cloud of a method.
 
     Attributes:
-        cloud: The points, which may be none; None if it could not be fused at all.
-        statistics: What became of the pixels; None without a cloud.
+        cloud: The points, maybe none; None if the fusion failed or was left out.
+        statistics: Counts of fused and rejected pixels; None without a cloud.
         seconds: Wall time of the fusion.
-        note: What there is to say: no points, or why there is no cloud.
+        note: Why there is no point or no cloud; else "".
     """
 
     cloud: PointCloud | None
@@ -71,23 +71,23 @@ def fuse_methods(
     config: FuseConfig,
     progress: Progress,
 ) -> dict[str, dict[str, MethodCloud]]:
-    """Fuse every arm twice; nothing is written into the workspace.
+    """Fuse the maps of every method twice; the workspace stays as it is.
 
-    Each arm becomes a temporary workspace of links. Where a view has no normal map,
-    normals are computed from its depth, as those of refined maps are.
+    Each method gets a temporary workspace of links. Normals of views without a normal
+    map are computed from the depth, as in `refine`.
 
     Args:
-        workspace: The user's.
+        workspace: Has images and model.
         scene: Its views.
         methods: What to fuse.
         config: Thresholds of both.
-        progress: Who listens.
+        progress: Reports the progress.
 
     Returns:
-        The clouds by the name of the fuser, then of the arm.
+        The clouds by fuser, then by method.
 
     Raises:
-        WorkspaceError: If a map cannot be read, or the temporary folder not be written.
+        WorkspaceError: If a map cannot be read, or a temporary file cannot be written.
     """
     clouds: dict[str, dict[str, MethodCloud]] = {str(fuser): {} for fuser in Fuser}
     for method in methods:
@@ -106,7 +106,7 @@ def fuse_methods(
 
 
 def fusion_settings(config: FuseConfig, num_views: int) -> Mapping[str, dict[str, Any]]:
-    """What each fuser is told, by its name, in its own words; the same for all arms."""
+    """The options of each fuser, under its own names; the same for all methods."""
     needed = min(config.min_num_views, num_views)
     shared = {
         "max_depth_error": config.max_depth_error,
@@ -157,17 +157,17 @@ def _fused(
 def _linked(
     workspace: Workspace, method: Method, min_confidence: float, folder: Path
 ) -> OutputWorkspace:
-    """A workspace with the arm's maps, named as COLMAP's fusion wants them."""
+    """A workspace with the maps of a method, under the names that COLMAP fuses."""
     copy = OutputWorkspace(source=dataclasses.replace(workspace, path=folder))
     names = [file.view.name for file in method.files]
     copy.prepare(names)
     copy.write_cfgs(names)
     for file in method.files:
-        _place_maps(copy, file, min_confidence)
+        _link_maps(copy, file, min_confidence)
     return copy
 
 
-def _place_maps(copy: OutputWorkspace, file: MapFiles, min_confidence: float) -> None:
+def _link_maps(copy: OutputWorkspace, file: MapFiles, min_confidence: float) -> None:
     name = file.view.name
     depth_path, normal_path = copy.depth_map_path(name), copy.normal_map_path(name)
     has_normals = file.normal_path is not None and file.normal_path.is_file()
