@@ -1,4 +1,4 @@
-"""The result of comparing depth maps with the truth, scene by scene and overall."""
+"""The result of an evaluation of depth maps, scene by scene and overall."""
 
 import dataclasses
 import datetime
@@ -9,10 +9,10 @@ from typing import Any
 from resdepth_colmap.config import RefineConfig, StereoConfig
 from resdepth_colmap.evaluation.depth.methods import METHODS, REGIONS, SampleResult
 from resdepth_colmap.evaluation.metrics.depth_metrics import DepthMetrics
-from resdepth_colmap.evaluation.metrics.pooled_metrics import ErrorSample, pooled
+from resdepth_colmap.evaluation.metrics.pooled_metrics import PooledErrors, pooled
 
-Errors = Mapping[str, Mapping[str, ErrorSample]]
-"""By region, then by arm."""
+Errors = Mapping[str, Mapping[str, PooledErrors]]
+"""By region, then by method."""
 
 _REFINE_OPTIONS = (
     "inner_iterations",
@@ -25,11 +25,11 @@ _REFINE_OPTIONS = (
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class SceneResult:
-    """What was measured on one scene.
+    """The errors of one scene.
 
     Attributes:
-        name: What it is called.
-        samples: One result a view.
+        name: Name of the scene.
+        samples: The results of its samples.
     """
 
     name: str
@@ -43,16 +43,12 @@ class SceneResult:
     @property
     def mae_ratio(self) -> float:
         """Mean absolute error, refined over unfiltered; NaN if that is 0."""
-        methods = self.errors["all"]
-        return _ratio(methods["refined"].metrics.mae, methods["unfiltered"].metrics.mae)
+        return self._ratio("mae")
 
     @property
     def medae_ratio(self) -> float:
         """Median absolute error, refined over unfiltered; NaN if that is 0."""
-        methods = self.errors["all"]
-        return _ratio(
-            methods["refined"].metrics.medae, methods["unfiltered"].metrics.medae
-        )
+        return self._ratio("medae")
 
     def to_mapping(self) -> dict[str, Any]:
         """Plain values, ready for JSON."""
@@ -77,6 +73,14 @@ class SceneResult:
             }
         return mapping
 
+    def _ratio(self, error: str) -> float:
+        methods = self.errors["all"]
+        refined, unfiltered = (
+            float(getattr(methods[method].metrics, error))
+            for method in ("refined", "unfiltered")
+        )
+        return refined / unfiltered if unfiltered else math.nan
+
     def _seen(self) -> dict[str, float | int | None]:
         samples = [sample.seen for sample in self.samples if sample.seen is not None]
         medians = [sample.seen_median_relative_error for sample in self.samples]
@@ -87,7 +91,7 @@ class SceneResult:
         }
 
     def _per_megapixel(self, name: str) -> float | None:
-        timed = [c for c in self.samples if getattr(c, name) is not None]
+        timed = [it for it in self.samples if getattr(it, name) is not None]
         megapixels = sum(sample.megapixels for sample in timed)
         if not megapixels:
             return None
@@ -97,17 +101,17 @@ class SceneResult:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class DepthReport:
-    """The comparison's result, and what it was made with.
+    """The result of an evaluation, and its options.
 
     Attributes:
         date: Day of the measurement.
         weights_sha256: Hash of the weights file.
         refine: Options of the refinement.
         stereo: Options of the matcher.
-        max_residual: Larger errors were discarded, in units; None = none was.
-        versions: Of Python and the packages that matter.
-        scenes: One result a scene.
-        failed: What is wrong with each scene that could not be measured, by name.
+        max_residual: Larger errors were discarded, in units; None = no limit.
+        versions: Of Python and the main packages.
+        scenes: The results of the scenes.
+        failed: The reasons for scenes without a result, by name.
     """
 
     date: datetime.date
@@ -127,7 +131,7 @@ class DepthReport:
         return pooled_errors([scene.errors for scene in self.scenes])
 
     def to_mapping(self) -> dict[str, Any]:
-        """Plain values, ready for JSON; no path of this machine among them."""
+        """Plain values, ready for JSON; without absolute paths."""
         refine = self.refine.to_mapping()
         errors = self.errors
         return {
@@ -150,7 +154,7 @@ class DepthReport:
 
 
 def pooled_errors(errors: Sequence[Errors]) -> Errors:
-    """The errors over all pixels of several results, by region and arm."""
+    """The errors over all pixels of several results, by region and method."""
     return {
         region: {
             method: pooled([it[region][method] for it in errors]) for method in METHODS
@@ -160,7 +164,7 @@ def pooled_errors(errors: Sequence[Errors]) -> Errors:
 
 
 def plain_errors(errors: Errors) -> dict[str, Any]:
-    """For JSON: the arms of the whole map by their names, the regions beside them."""
+    """For JSON: the methods over the full map, and those of each region."""
     by_region = {
         region: {method: plain_metrics(methods[method].metrics) for method in METHODS}
         for region, methods in errors.items()
@@ -169,7 +173,7 @@ def plain_errors(errors: Errors) -> dict[str, Any]:
 
 
 def plain_metrics(metrics: DepthMetrics) -> dict[str, float | int | None]:
-    """For JSON: six digits, None where there is no number."""
+    """For JSON: six digits, None for NaN."""
     values = metrics.to_mapping()
     return {k: v if v is None else round(v, 6) for k, v in values.items()}
 
@@ -177,10 +181,6 @@ def plain_metrics(metrics: DepthMetrics) -> dict[str, float | int | None]:
 def plain(value: float) -> float | None:
     """For JSON: six digits, None for NaN."""
     return None if math.isnan(value) else round(value, 6)
-
-
-def _ratio(value: float, reference: float) -> float:
-    return value / reference if reference else float("nan")
 
 
 def _mean(values: Sequence[float]) -> float:

@@ -1,4 +1,4 @@
-"""Depth maps of a workspace against its `ground_truth/`, before and after."""
+"""Depth maps of a workspace against its `ground_truth/`, initial and refined."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -12,7 +12,7 @@ from resdepth_colmap.pipeline.initial_map import map_path
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Comparison:
-    """Errors of one image's depth.
+    """Errors of the depth of one image.
 
     Attributes:
         name: Image name.
@@ -28,18 +28,18 @@ class Comparison:
 def compare_with_truth(
     output: OutputWorkspace, kinds: Mapping[str, str]
 ) -> tuple[Comparison, ...]:
-    """Measure the refined maps of a workspace, and what they were refined from.
+    """The errors of the refined maps of a workspace and of their initial maps.
 
-    No residual is discarded: rooms have no background that is kilometres away.
+    No residual is discarded: rooms have no distant background.
 
     Args:
         output: Where the refined maps are; its source has `ground_truth/`.
-        kinds: The kind of map that was refined, by image name. Images without a true
-            depth map are left out.
+        kinds: The kind of the initial map, by image name. Images without ground truth
+            are left out.
 
     Raises:
-        WorkspaceError: If no image has a true depth map, or a map is broken or of
-            another size than the true one.
+        WorkspaceError: If no image has ground truth, or a map is broken or differs from
+            it in size.
     """
     workspace = output.source
     comparisons = []
