@@ -238,7 +238,7 @@ def test_a_scene_that_is_missing_is_named(
     result = evaluate(tmp_path, rendered.path.parent, *scenes, *options)
     assert result.exit_code == 1
     assert "Error: kicker: " in result.stderr
-    assert "no scene kicker in it; there are: office" in result.stderr
+    assert "no scene kicker; there are: office" in result.stderr
     assert "| office | refined |" in result.stdout
 
 
