@@ -35,7 +35,7 @@ class Residuals(NamedTuple):
         """The valid errors, shape (M,)."""
         return self.errors[self.is_valid]
 
-    def bad_share(self, limits: npt.ArrayLike) -> float:
+    def bad_share(self, limits: npt.NDArray[np.float64] | float) -> float:
         """Share of invalid pixels and of errors beyond limits in units; NaN of none."""
         is_bad = ~self.is_valid | (self.errors > limits)
         return float(is_bad.mean()) if is_bad.size else math.nan
