@@ -110,10 +110,9 @@ def run_evaluation(
         protocol: How samples were chosen, for the result.
     """
     from resdepth_colmap.cli.log import BarProgress
-    from resdepth_colmap.evaluation.depth.evaluation import Listener, evaluate_scenes
+    from resdepth_colmap.evaluation.depth.evaluation import evaluate_scenes
 
-    listener = Listener(on_failure=show_failure, progress=BarProgress())
-    report = evaluate_scenes(sources, options, listener)
+    report = evaluate_scenes(sources, options, show_failure, BarProgress())
     measured = {"command": command_line(skip=UNRECORDED), **report.to_mapping()}
     if protocol is not None:
         measured["protocol"] = protocol

@@ -1,7 +1,6 @@
 """The result of a comparison, as plain values for JSON and tables."""
 
 import dataclasses
-import math
 from collections.abc import Sequence
 from typing import Any, Protocol
 
@@ -15,6 +14,7 @@ from resdepth_colmap.evaluation.compare.view_metrics import MeasuredView
 from resdepth_colmap.evaluation.metrics.measures import MEASURES
 from resdepth_colmap.evaluation.metrics.paired_difference import paired_difference
 from resdepth_colmap.evaluation.metrics.tile_sums import TileSums
+from resdepth_colmap.evaluation.plain import finite_mean, plain
 from resdepth_colmap.progress import Progress
 
 
@@ -73,7 +73,10 @@ class Comparison:
                 for fuser, clouds in self.clouds.items()
             },
             "measures": {
-                name: {it: _mean(_means(self._sums(name, it))) for it in MEASURES}
+                name: {
+                    it: plain(finite_mean(_means(self._sums(name, it))))
+                    for it in MEASURES
+                }
                 for name in names
             },
             "paired": {
@@ -83,7 +86,7 @@ class Comparison:
             },
             "per_view": {
                 view.name: {
-                    method: {name: _plain(it.mean) for name, it in sums.items()}
+                    method: {name: plain(it.mean) for name, it in sums.items()}
                     for method, sums in view.sums.items()
                 }
                 for view in self.views
@@ -113,12 +116,3 @@ class Comparison:
 
 def _means(sums: Sequence[TileSums]) -> list[float]:
     return [it.mean for it in sums]
-
-
-def _mean(values: Sequence[float]) -> float | None:
-    finite = [value for value in values if math.isfinite(value)]
-    return _plain(sum(finite) / len(finite)) if finite else None
-
-
-def _plain(value: float) -> float | None:
-    return None if math.isnan(value) else round(value, 6)

@@ -54,30 +54,19 @@ class EvaluationOptions:
     max_residual: float | None = PAPER_MAX_RESIDUAL
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class Listener:
-    """Callbacks of an evaluation.
-
-    Attributes:
-        on_failure: Called with the name of a broken scene and the reason.
-        progress: Reports the progress, as one stage.
-    """
-
-    on_failure: Callable[[str, str], None] | None = None
-    progress: Progress = dataclasses.field(default_factory=SilentProgress)
-
-
 def evaluate_scenes(
     sources: Sequence[SceneSource],
     options: EvaluationOptions,
-    listener: Listener | None = None,
+    on_failure: Callable[[str, str], None] | None = None,
+    progress: Progress | None = None,
 ) -> DepthReport:
     """Evaluate every scene that can be read.
 
     Args:
         sources: The scenes.
         options: How depth maps are matched, refined and compared.
-        listener: Callbacks.
+        on_failure: Called with the name of a broken scene and the reason.
+        progress: Reports the progress, as one stage.
 
     Returns:
         The results, and the reasons for the scenes without one.
@@ -86,20 +75,20 @@ def evaluate_scenes(
         WeightsError: If the weights cannot be read.
         BackendUnavailableError: If the requested device or matcher is not available.
     """
-    listener = listener or Listener()
+    progress = progress or SilentProgress()
     backend = matching_backend(options.backend)
     device = resolve_device(options.refine.device)
     network = for_inference(load_weights(options.refine.weights, device))
     _warm_up(network, options.refine)
     results, failed = [], {}
-    with listener.progress.stage("Evaluating", len(sources)) as advance:
+    with progress.stage("Evaluating", len(sources)) as advance:
         for source in sources:
             try:
                 result = _measure_scene(source, network, options, backend, advance)
             except ResDepthError as error:
                 failed[source.name] = " ".join(str(error).split())
-                if listener.on_failure:
-                    listener.on_failure(source.name, failed[source.name])
+                if on_failure:
+                    on_failure(source.name, failed[source.name])
             else:
                 results.append(result)
     return DepthReport(

@@ -3,13 +3,14 @@
 import dataclasses
 import datetime
 import math
+import statistics
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from resdepth_colmap.config import RefineConfig, StereoConfig
 from resdepth_colmap.evaluation.depth.methods import METHODS, REGIONS, SampleResult
-from resdepth_colmap.evaluation.metrics.depth_metrics import DepthMetrics
 from resdepth_colmap.evaluation.metrics.pooled_metrics import PooledErrors, pooled
+from resdepth_colmap.evaluation.plain import finite_mean, plain
 
 Errors = Mapping[str, Mapping[str, PooledErrors]]
 """By region, then by method."""
@@ -40,40 +41,8 @@ class SceneResult:
         """Over the pixels of all views."""
         return pooled_errors([sample.errors for sample in self.samples])
 
-    @property
-    def mae_ratio(self) -> float:
-        """Mean absolute error, refined over unfiltered; NaN if that is 0."""
-        return self._ratio("mae")
-
-    @property
-    def medae_ratio(self) -> float:
-        """Median absolute error, refined over unfiltered; NaN if that is 0."""
-        return self._ratio("medae")
-
-    def to_mapping(self) -> dict[str, Any]:
-        """Plain values, ready for JSON."""
-        mapping: dict[str, Any] = {
-            "initial": sorted({sample.origin for sample in self.samples}),
-            "num_views": len(self.samples),
-            "view_names": [sample.name for sample in self.samples],
-            **plain_errors(self.errors),
-        }
-        if all(sample.seen is not None for sample in self.samples):
-            mapping["unfiltered_seen_by_both"] = self._seen()
-        mapping |= {
-            "matching_cpu_s_per_mp": self._per_megapixel("matching_cpu_s"),
-            "refining_cpu_s_per_mp": self._per_megapixel("refining_cpu_s"),
-            "mae_ratio": plain(self.mae_ratio),
-            "medae_ratio": plain(self.medae_ratio),
-        }
-        if len(self.samples) > 1:
-            mapping["views"] = {
-                sample.name: {"initial": sample.origin, **plain_errors(sample.errors)}
-                for sample in self.samples
-            }
-        return mapping
-
-    def _ratio(self, error: str) -> float:
+    def ratio(self, error: str) -> float:
+        """An error, "mae" or "medae", refined over unfiltered; NaN if that is 0."""
         methods = self.errors["all"]
         refined, unfiltered = (
             float(getattr(methods[method].metrics, error))
@@ -81,14 +50,34 @@ class SceneResult:
         )
         return refined / unfiltered if unfiltered else math.nan
 
-    def _seen(self) -> dict[str, float | int | None]:
-        samples = [sample.seen for sample in self.samples if sample.seen is not None]
-        medians = [sample.seen_median_relative_error for sample in self.samples]
-        finite = [m for m in medians if m is not None and math.isfinite(m)]
-        return {
-            **plain_metrics(pooled(samples).metrics),
-            "median_relative_error": plain(_mean(finite)),
+    def to_mapping(self) -> dict[str, Any]:
+        """Plain values, ready for JSON."""
+        mapping = {
+            "initial": sorted({sample.origin for sample in self.samples}),
+            "num_views": len(self.samples),
+            "view_names": [sample.name for sample in self.samples],
+            **_by_name(self.errors),
+            **self._seen(),
+            "matching_cpu_s_per_mp": self._per_megapixel("matching_cpu_s"),
+            "refining_cpu_s_per_mp": self._per_megapixel("refining_cpu_s"),
+            "mae_ratio": self.ratio("mae"),
+            "medae_ratio": self.ratio("medae"),
         }
+        if len(self.samples) > 1:
+            mapping["views"] = {
+                sample.name: {"initial": sample.origin, **_by_name(sample.errors)}
+                for sample in self.samples
+            }
+        return dict(plain(mapping))
+
+    def _seen(self) -> dict[str, Any]:
+        seen = [sample.seen for sample in self.samples if sample.seen is not None]
+        if len(seen) < len(self.samples):
+            return {}
+        medians = [sample.seen_median_relative_error for sample in self.samples]
+        median = finite_mean(it for it in medians if it is not None)
+        errors = {**pooled(seen).metrics.to_mapping(), "median_relative_error": median}
+        return {"unfiltered_seen_by_both": errors}
 
     def _per_megapixel(self, name: str) -> float | None:
         timed = [it for it in self.samples if getattr(it, name) is not None]
@@ -144,13 +133,17 @@ class DepthReport:
             },
             "versions": dict(self.versions),
             "scenes": {scene.name: scene.to_mapping() for scene in self.scenes},
-            "overall": None if errors is None else plain_errors(errors),
+            "overall": None if errors is None else plain(_by_name(errors)),
             "mean": {
-                "mae_ratio": plain(_mean([s.mae_ratio for s in self.scenes])),
-                "medae_ratio": plain(_mean([s.medae_ratio for s in self.scenes])),
+                f"{error}_ratio": plain(self._mean_ratio(error))
+                for error in ("mae", "medae")
             },
             "failed": dict(self.failed),
         }
+
+    def _mean_ratio(self, error: str) -> float:
+        ratios = [scene.ratio(error) for scene in self.scenes]
+        return statistics.fmean(ratios) if ratios else math.nan
 
 
 def pooled_errors(errors: Sequence[Errors]) -> Errors:
@@ -163,25 +156,10 @@ def pooled_errors(errors: Sequence[Errors]) -> Errors:
     }
 
 
-def plain_errors(errors: Errors) -> dict[str, Any]:
-    """For JSON: the methods over the full map, and those of each region."""
-    by_region = {
-        region: {method: plain_metrics(methods[method].metrics) for method in METHODS}
+def _by_name(errors: Errors) -> dict[str, Any]:
+    """The errors over all pixels by method, and beside them those of each region."""
+    named = {
+        region: {method: it.metrics.to_mapping() for method, it in methods.items()}
         for region, methods in errors.items()
     }
-    return {**by_region["all"], **{r: by_region[r] for r in REGIONS if r != "all"}}
-
-
-def plain_metrics(metrics: DepthMetrics) -> dict[str, float | int | None]:
-    """For JSON: six digits, None for NaN."""
-    values = metrics.to_mapping()
-    return {k: v if v is None else round(v, 6) for k, v in values.items()}
-
-
-def plain(value: float) -> float | None:
-    """For JSON: six digits, None for NaN."""
-    return None if math.isnan(value) else round(value, 6)
-
-
-def _mean(values: Sequence[float]) -> float:
-    return sum(values) / len(values) if values else float("nan")
+    return {**named.pop("all"), **named}

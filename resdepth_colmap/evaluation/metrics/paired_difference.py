@@ -11,6 +11,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.stats import bootstrap
 
+from resdepth_colmap.evaluation.plain import plain
+
 NUM_RESAMPLES = 2000
 CONFIDENCE_LEVEL = 0.95
 _SEED = 0
@@ -40,13 +42,8 @@ class PairedDifference:
     interval: tuple[float, float] | None = None
 
     def to_mapping(self) -> dict[str, Any]:
-        """Plain values, ready for JSON: six digits."""
-        values = dataclasses.asdict(self)
-        for name in ("mean", "median"):
-            values[name] = None if values[name] is None else round(values[name], 6)
-        if self.interval is not None:
-            values["interval"] = [round(bound, 6) for bound in self.interval]
-        return values
+        """Plain values, ready for JSON."""
+        return dict(plain(dataclasses.asdict(self)))
 
 
 def paired_difference(

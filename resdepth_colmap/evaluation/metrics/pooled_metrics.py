@@ -25,6 +25,7 @@ SMALLEST = 1e-9
 _BINS_A_DECADE = 500
 _NUM_DECADES = 15
 _NUM_BINS = _BINS_A_DECADE * _NUM_DECADES
+_COUNTS = ("num_pixels", "num_valid", "num_missing", "num_discarded")
 _SHARES = ("bad_1", "bad_2", "bad_1cm", "bad_2cm", "bad_5cm")
 
 
@@ -68,35 +69,25 @@ def pooled(parts: Sequence[PooledErrors]) -> PooledErrors:
     if len(parts) == 1:
         return parts[0]
     metrics = [part.metrics for part in parts]
-    valid = [m.num_valid for m in metrics]
-    square = _mean([m.rmse**2 for m in metrics], valid)
-    pixels = [m.num_pixels for m in metrics]
-    shares = {n: _mean([getattr(m, n) for m in metrics], pixels) for n in _SHARES}
-    histogram: npt.NDArray[np.uint32] = np.zeros(_NUM_BINS, np.uint32)
-    for part in parts:
-        histogram += part.histogram
-    return PooledErrors(
-        metrics=DepthMetrics(
-            num_pixels=sum(pixels),
-            num_valid=sum(valid),
-            num_missing=sum(m.num_missing for m in metrics),
-            num_discarded=sum(m.num_discarded for m in metrics),
-            mae=_mean([m.mae for m in metrics], valid),
-            rmse=math.sqrt(square),
-            medae=_median(histogram),
-            **shares,
-        ),
-        histogram=histogram,
+    histogram = np.sum([part.histogram for part in parts], axis=0, dtype=np.uint32)
+
+    def total(name: str) -> int:
+        return sum(getattr(it, name) for it in metrics)
+
+    def mean(name: str, weight: str, power: int = 1) -> float:
+        """Weighted mean; NaN without any weight."""
+        pairs = [(getattr(it, name), getattr(it, weight)) for it in metrics]
+        weighted = [value**power * number for value, number in pairs if number]
+        return sum(weighted) / total(weight) if weighted else math.nan
+
+    pooled_metrics = DepthMetrics(
+        **{name: total(name) for name in _COUNTS},
+        mae=mean("mae", "num_valid"),
+        rmse=math.sqrt(mean("rmse", "num_valid", power=2)),
+        medae=_median(histogram),
+        **{name: mean(name, "num_pixels") for name in _SHARES},
     )
-
-
-def _mean(values: Sequence[float], weights: Sequence[int]) -> float:
-    """Weighted mean; values of weight 0 may be NaN. NaN without any weight."""
-    total = sum(weights)
-    if not total:
-        return math.nan
-    weighted = (v * w for v, w in zip(values, weights, strict=True) if w)
-    return sum(weighted) / total
+    return PooledErrors(metrics=pooled_metrics, histogram=histogram)
 
 
 def _histogram(residuals: npt.NDArray[np.float64]) -> npt.NDArray[np.uint32]:
