@@ -8,10 +8,12 @@ import numpy as np
 import numpy.typing as npt
 import scipy.spatial
 
+from resdepth_colmap.geometry.pixels import CENTER_PX, index_K
+from resdepth_colmap.geometry.projection import pixel_rays
 from resdepth_colmap.io.png import encode_png
 from resdepth_colmap.io.point_cloud import PointCloud
 from resdepth_colmap.report.packing import MAX_VALUE, byte_planes
-from resdepth_colmap.scene import Camera, Matrix, View
+from resdepth_colmap.scene import Matrix, View
 
 SIZE = 10.0
 """Longest side of the box of points, in page units."""
@@ -150,7 +152,10 @@ def camera_outline(view: View, box: CloudBox) -> list[list[float]]:
     """Apex and four corners of the pyramid of a camera, in page units."""
     camera = view.camera
     length = _CAMERA_SIZE * SIZE / box.scale
-    corners = _corner_rays(camera) * length
+    right, bottom = camera.width_px - CENTER_PX, camera.height_px - CENTER_PX
+    left = top = -CENTER_PX
+    xy = [[left, top], [right, top], [right, bottom], [left, bottom]]
+    corners = pixel_rays(xy, index_K(camera)) * length
     rotation, translation = view.cam_from_world[:, :3], view.cam_from_world[:, 3]
     corners_in_world = (corners - translation) @ rotation
     outline = np.vstack([view.center_in_world, corners_in_world])
@@ -162,14 +167,6 @@ def _direction(directions: Matrix) -> Matrix:
     mean = directions.mean(axis=0)
     length = float(np.linalg.norm(mean))
     return np.asarray(mean / length if length > 0.3 else directions[0], np.float64)
-
-
-def _corner_rays(camera: Camera) -> Matrix:
-    left, right = -camera.cx / camera.fx, (camera.width_px - camera.cx) / camera.fx
-    top, bottom = -camera.cy / camera.fy, (camera.height_px - camera.cy) / camera.fy
-    return np.array(
-        [[left, top, 1], [right, top, 1], [right, bottom, 1], [left, bottom, 1]]
-    )
 
 
 def _rounded(xyz: Matrix) -> list[float]:

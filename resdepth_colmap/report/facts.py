@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from resdepth_colmap.evaluation.metrics.depth_metrics import depth_metrics
 from resdepth_colmap.report.image_maps import ImageMaps
 from resdepth_colmap.viz.colormaps import (
     DepthScale,
@@ -28,6 +27,7 @@ def image_facts(maps: ImageMaps, record: Record) -> dict[str, Any]:
     scale = DepthScale.of(maps.after, maps.before)
     change = relative_difference(maps.before, maps.after)
     size = np.abs(change[np.isfinite(change)])
+    errors = maps.errors
     height_px, width_px = maps.before.shape
     return {
         "name": maps.name,
@@ -40,7 +40,7 @@ def image_facts(maps: ImageMaps, record: Record) -> dict[str, Any]:
         "input": str(record.get("input", "")),
         "sources": _sources(record),
         "seconds": _number(record.get("seconds")),
-        "metrics": _metrics(maps),
+        "metrics": errors and [errors.before.to_mapping(), errors.after.to_mapping()],
     }
 
 
@@ -107,17 +107,6 @@ def rounded(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [rounded(item) for item in value]
     return value
-
-
-def _metrics(maps: ImageMaps) -> list[dict[str, float | int | None]] | None:
-    """Errors before and after; no residual is discarded."""
-    truth = maps.truth
-    if truth is None:
-        return None
-    return [
-        depth_metrics(depth, truth, max_residual=None).to_mapping()
-        for depth in (maps.before, maps.after)
-    ]
 
 
 def _mean_metrics(images: Sequence[Record]) -> list[dict[str, float | None]] | None:

@@ -2,9 +2,12 @@
 
 import dataclasses
 import math
+from collections.abc import Mapping
 from pathlib import Path
+from typing import NamedTuple
 
 from resdepth_colmap.errors import WorkspaceError
+from resdepth_colmap.evaluation.metrics.depth_metrics import DepthMetrics, depth_metrics
 from resdepth_colmap.geometry.resize import nearest_resized
 from resdepth_colmap.io.colmap.depth_map import read_depth_map
 from resdepth_colmap.io.colmap.output import OutputWorkspace
@@ -33,6 +36,17 @@ class ImageMaps:
     confidence: FloatMap | None = None
     truth: DepthMap | None = None
 
+    @property
+    def errors(self) -> "ImageErrors | None":
+        """Errors against ground truth, without a limit; None without ground truth."""
+        if self.truth is None:
+            return None
+        before, after = (
+            depth_metrics(depth, self.truth, max_residual=None)
+            for depth in (self.before, self.after)
+        )
+        return ImageErrors(self.name, before, after)
+
     def sampled(self, num_pixels: float) -> "ImageMaps":
         """The maps with at most `num_pixels` pixels, sampled at the nearest pixels."""
         height_px, width_px = smaller_size(self.before.shape, num_pixels)
@@ -44,6 +58,30 @@ class ImageMaps:
             confidence=_resized_or_none(self.confidence, size),
             truth=_resized_or_none(self.truth, size),
         )
+
+
+class ImageErrors(NamedTuple):
+    """Errors of the depth of one image, before and after the refinement."""
+
+    name: str
+    before: DepthMetrics
+    after: DepthMetrics
+
+
+def image_errors(
+    output: OutputWorkspace, kinds: Mapping[str, str]
+) -> list[ImageErrors]:
+    """The errors of the images with ground truth.
+
+    Args:
+        output: Has the refined maps; its source has `ground_truth/`.
+        kinds: The kind of the initial map, by image name.
+
+    Raises:
+        WorkspaceError: If a file is missing or broken, or two maps differ in size.
+    """
+    errors = (load_maps(output, name, kind).errors for name, kind in kinds.items())
+    return [it for it in errors if it is not None]
 
 
 def load_maps(output: OutputWorkspace, name: str, kind: str) -> ImageMaps:
