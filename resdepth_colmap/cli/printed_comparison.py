@@ -44,7 +44,7 @@ def _show_clouds(clouds: Mapping[str, Any]) -> None:
     table = Table(title="clouds")
     for header in ("fusion", "method"):
         table.add_column(header)
-    for header in ("points", "tolerance", "accuracy", "completeness", "F1"):
+    for header in ("points", "tolerance", "accuracy", "complete", "F1"):
         table.add_column(header, justify="right")
     notes: dict[str, list[str]] = {}
     for fuser, methods in clouds.items():

@@ -1,28 +1,26 @@
 """The maps of each method, fused by open3d and by COLMAP with the same thresholds."""
 
 import dataclasses
+import functools
 import tempfile
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from resdepth_colmap.config import FuseConfig, Fuser
 from resdepth_colmap.errors import FusionError
 from resdepth_colmap.evaluation.compare.method_maps import confident_depth
 from resdepth_colmap.evaluation.compare.methods import Method
-from resdepth_colmap.geometry.normals import normals_from_depth
-from resdepth_colmap.geometry.pixels import index_K
-from resdepth_colmap.io.colmap.depth_map import write_depth_map
-from resdepth_colmap.io.colmap.normal_map import write_normal_map
 from resdepth_colmap.io.colmap.output import OutputWorkspace
 from resdepth_colmap.io.colmap.workspace import Workspace
 from resdepth_colmap.io.files import link_or_copy
 from resdepth_colmap.io.point_cloud import PointCloud
 from resdepth_colmap.pipeline.fuse.colmap import fuse_with_colmap
-from resdepth_colmap.pipeline.fuse.geometric_consistency import FuseStatistics
+from resdepth_colmap.pipeline.fuse.geometric_consistency import (
+    Consistent,
+    FuseStatistics,
+)
 from resdepth_colmap.pipeline.fuse.stage import fuse_maps
 from resdepth_colmap.pipeline.fuse.views import MapFiles
 from resdepth_colmap.progress import Progress
@@ -73,8 +71,7 @@ def fuse_methods(
 ) -> dict[str, dict[str, MethodCloud]]:
     """Fuse the maps of every method twice; the workspace stays as it is.
 
-    Each method gets a temporary workspace of links. Normals of views without a normal
-    map are computed from the depth, as in `refine`.
+    Normals of views without a normal map are computed from the depth.
 
     Args:
         workspace: Has images and model.
@@ -91,17 +88,14 @@ def fuse_methods(
     """
     clouds: dict[str, dict[str, MethodCloud]] = {str(fuser): {} for fuser in Fuser}
     for method in methods:
-        with tempfile.TemporaryDirectory(prefix="resdepth-compare-") as folder:
-            copy = _linked(workspace, method, config.min_confidence, Path(folder))
-            files = [_file_in(copy, file) for file in method.files]
-            for fuser in Fuser:
-                clouds[str(fuser)][method.name] = _fused(
-                    copy,
-                    scene,
-                    files,
-                    dataclasses.replace(config, fuser=fuser),
-                    progress,
-                )
+        fuse = functools.partial(fuse_maps, method.files, scene, config, progress)
+        clouds[str(Fuser.OPEN3D)][method.name] = _timed(fuse)
+        fuse = functools.partial(_fuse_by_colmap, workspace, scene, method, config)
+        clouds[str(Fuser.COLMAP)][method.name] = (
+            MethodCloud(cloud=None, note=NO_TRACKS)
+            if scene.num_shared_points is None
+            else _timed(fuse)
+        )
     return clouds
 
 
@@ -129,23 +123,12 @@ def fusion_settings(config: FuseConfig, num_views: int) -> Mapping[str, dict[str
     }
 
 
-def _fused(
-    copy: OutputWorkspace,
-    scene: Scene,
-    files: Sequence[MapFiles],
-    config: FuseConfig,
-    progress: Progress,
-) -> MethodCloud:
+def _timed(fuse: Callable[[], Consistent]) -> MethodCloud:
     start = time.perf_counter()
-    if config.fuser is Fuser.OPEN3D:
-        found = fuse_maps(files, scene, config, progress)
-    elif scene.num_shared_points is None:
-        return MethodCloud(cloud=None, note=NO_TRACKS)
-    else:
-        try:
-            found = fuse_with_colmap(copy.workspace, scene, files, config)
-        except FusionError as error:
-            return MethodCloud(cloud=None, note=" ".join(str(error).split()))
+    try:
+        found = fuse()
+    except FusionError as error:
+        return MethodCloud(cloud=None, note=" ".join(str(error).split()))
     return MethodCloud(
         cloud=found.cloud,
         statistics=found.statistics,
@@ -154,42 +137,27 @@ def _fused(
     )
 
 
-def _linked(
-    workspace: Workspace, method: Method, min_confidence: float, folder: Path
-) -> OutputWorkspace:
-    """A workspace with the maps of a method, under the names that COLMAP fuses."""
-    copy = OutputWorkspace(source=dataclasses.replace(workspace, path=folder))
+def _fuse_by_colmap(
+    workspace: Workspace, scene: Scene, method: Method, config: FuseConfig
+) -> Consistent:
+    """Fuse in a temporary workspace of links, under the names that COLMAP fuses."""
     names = [file.view.name for file in method.files]
-    copy.prepare(names)
-    copy.write_cfgs(names)
-    for file in method.files:
-        _link_maps(copy, file, min_confidence)
-    return copy
+    with tempfile.TemporaryDirectory(prefix="resdepth-compare-") as folder:
+        copy = OutputWorkspace(source=dataclasses.replace(workspace, path=Path(folder)))
+        copy.prepare(names)
+        copy.write_cfgs(names)
+        files = [_linked(file, copy, config.min_confidence) for file in method.files]
+        return fuse_with_colmap(copy.workspace, scene, files, config)
 
 
-def _link_maps(copy: OutputWorkspace, file: MapFiles, min_confidence: float) -> None:
+def _linked(file: MapFiles, copy: OutputWorkspace, min_confidence: float) -> MapFiles:
     name = file.view.name
     depth_path, normal_path = copy.depth_map_path(name), copy.normal_map_path(name)
-    has_normals = file.normal_path is not None and file.normal_path.is_file()
-    if min_confidence > 0 or not has_normals:
-        depth = confident_depth(file, min_confidence)
-    if min_confidence > 0:
-        write_depth_map(depth_path, depth)
-    else:
+    normals = file.normal_path
+    if min_confidence == 0 and normals is not None and normals.is_file():
         link_or_copy(file.depth_path, depth_path)
-    if has_normals and file.normal_path is not None:
-        link_or_copy(file.normal_path, normal_path)
+        link_or_copy(normals, normal_path)
     else:
-        height_px, width_px = depth.shape
-        K = index_K(file.view.camera.resized(width_px, height_px))
-        write_normal_map(normal_path, np.asarray(normals_from_depth(depth, K)))
-
-
-def _file_in(copy: OutputWorkspace, file: MapFiles) -> MapFiles:
-    name = file.view.name
-    return MapFiles(
-        view=file.view,
-        image_path=file.image_path,
-        depth_path=copy.depth_map_path(name),
-        normal_path=copy.normal_map_path(name),
-    )
+        depth = confident_depth(file, min_confidence)
+        copy.write_maps(name, depth, file.read().normals)
+    return dataclasses.replace(file, depth_path=depth_path, normal_path=normal_path)
