@@ -1,4 +1,4 @@
-"""How well the true depth of a case carries its source into its reference."""
+"""How well the true depth of a sample warps its source into its reference."""
 
 import numpy as np
 import torch

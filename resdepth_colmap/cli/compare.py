@@ -1,6 +1,5 @@
 """The command `compare`: filtered, unfiltered and refined maps, side by side."""
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -8,24 +7,23 @@ import click
 
 from resdepth_colmap.cli.command_line import command_line
 from resdepth_colmap.cli.options import build_config, command, config_options
+from resdepth_colmap.cli.results import (
+    UNRECORDED,
+    exit_if_failed,
+    parsed_tolerances,
+    result_options,
+    show_failure,
+    show_result,
+)
 from resdepth_colmap.config import FuseConfig
 from resdepth_colmap.evaluation.compare.config import FUSE_OPTIONS, CompareConfig
 
 if TYPE_CHECKING:
-    from resdepth_colmap.evaluation.compare.comparison import CloudTruth
-
-_UNSAID = ("as_json", "output")  # they change no figure
-
-
-def _tolerances(_context: click.Context, _option: object, text: str) -> Any:
-    try:
-        return tuple(sorted({float(word) for word in text.replace(",", " ").split()}))
-    except ValueError as error:
-        raise click.BadParameter(f"{text!r}: {error}.") from error
+    from resdepth_colmap.evaluation.compare.result import GroundTruth
 
 
 @command(
-    "Compare filtered, unfiltered and refined maps, all fused alike.",
+    "Compare filtered, unfiltered and refined maps and their fused clouds.",
     "compare scene/dense",
     "compare scene/dense other/dense --min-num-views 2 --output compare.json",
     "compare scene/dense --ground-truth scan_clean/scan_alignment.mlp",
@@ -40,32 +38,28 @@ def _tolerances(_context: click.Context, _option: object, text: str) -> Any:
 @click.option(
     "--ground-truth",
     type=click.Path(path_type=Path),
-    help="ETH3D's scan_alignment.mlp: score the clouds by its rules, in metres.",
+    help="ETH3D's scan_alignment.mlp: score the clouds against these laser scans, in "
+    "metres.",
 )
 @click.option(
     "--tolerances",
-    callback=_tolerances,
+    callback=parsed_tolerances,
     default="",
-    help="Distances up to which a point is right, in workspace units, with commas "
-    "between.  [default: 1 % and 2 % of the mean true depth; those of `evaluate cloud` "
-    "with --ground-truth]",
+    help="Largest distances of a correct point, in workspace units, separated by "
+    "commas.  [default: 1 % and 2 % of the mean true depth; with --ground-truth those "
+    "of `evaluate cloud`]",
 )
 @click.option(
-    "--filtered", default="", help="The kind of map that is the filtered arm."
+    "--filtered", default="", help='The kind of map to compare as "filtered".'
 )
 @click.option(
-    "--unfiltered", default="", help="The kind of map that is the unfiltered arm."
+    "--unfiltered", default="", help='The kind of map to compare as "unfiltered".'
 )
 @config_options(FuseConfig, *FUSE_OPTIONS)
 @click.option(
-    "--in-place", is_flag=True, help="Compare what `refine --in-place` has refined."
+    "--in-place", is_flag=True, help="Compare maps that `refine --in-place` has made."
 )
-@click.option("--json", "as_json", is_flag=True, help="Print JSON instead of tables.")
-@click.option(
-    "--output",
-    type=click.Path(path_type=Path, dir_okay=False),
-    help="JSON file to write as well.",
-)
+@result_options
 def compare(
     workspaces: tuple[Path, ...],
     ground_truth: Path | None,
@@ -76,46 +70,33 @@ def compare(
 ) -> None:
     """Compare the filtered, unfiltered and refined depth maps of each WORKSPACE.
 
-    All are fused by COLMAP's fusion and ours, with the same settings. Where the truth
-    is known (ground_truth/IMAGE.bin, or laser scans), each cloud gets accuracy,
-    completeness and F1. Sparse points, the agreement of neighbouring maps, and photos
-    warped onto each other are witnesses where it is not. Differences are taken view by
-    view. Nothing in WORKSPACE is changed. A broken WORKSPACE does not stop the others;
-    the exit code is 1 then.
+    The maps of each method are fused by COLMAP and by open3d, with the same settings.
+    With ground truth (ground_truth/IMAGE.bin or laser scans), each cloud gets accuracy,
+    completeness and F1. Reference-free metrics need none: sparse points on the maps,
+    consistency of neighbouring maps, and correlation of warped images. Differences are
+    computed view by view. WORKSPACE stays as it is. A broken WORKSPACE does not stop
+    the others, but the exit code is 1.
     """
     fuse = build_config(FuseConfig, values)
     config = build_config(CompareConfig, {**values, "fuse": fuse})
     from resdepth_colmap.cli.log import BarProgress
-    from resdepth_colmap.cli.printed_comparison import show_workspace
-    from resdepth_colmap.evaluation.compare.comparisons import compare_workspaces
-    from resdepth_colmap.io.files import write_whole
+    from resdepth_colmap.cli.printed_comparison import show_workspaces
+    from resdepth_colmap.evaluation.compare.comparison import compare_workspaces
 
     report = compare_workspaces(
         workspaces,
         config,
         _truth(ground_truth, config),
         in_place=in_place,
-        on_failure=_say_failure,
+        on_failure=show_failure,
         progress=BarProgress(),
     )
-    measured = {"command": command_line(skip=_UNSAID), **report}
-    text = json.dumps(measured, indent=2, ensure_ascii=False)
-    if output is not None:
-        write_whole(output, f"{text}\n".encode())
-    if as_json:
-        click.echo(text)
-    else:
-        for name, found in measured["workspaces"].items():
-            show_workspace(name, found)
-    if measured["failed"]:
-        failed = measured["failed"]
-        names = ", ".join(failed)
-        summary = f"{len(failed)} of {len(workspaces)} workspaces failed: {names}"
-        click.echo(summary, err=as_json)
-        click.get_current_context().exit(1)
+    result = {"command": command_line(skip=UNRECORDED), **report}
+    show_result(result, show_workspaces, as_json=as_json, output=output)
+    exit_if_failed(report["failed"], len(workspaces), "workspaces", as_json=as_json)
 
 
-def _truth(path: Path | None, config: CompareConfig) -> "CloudTruth | None":
+def _truth(path: Path | None, config: CompareConfig) -> "GroundTruth | None":
     if path is None:
         return None
     from resdepth_colmap.evaluation.cloud.config import CloudConfig
@@ -123,7 +104,3 @@ def _truth(path: Path | None, config: CompareConfig) -> "CloudTruth | None":
 
     tolerances = config.tolerances or CloudConfig.tolerances
     return read_laser_truth(path, CloudConfig(tolerances=tolerances))
-
-
-def _say_failure(name: str, reason: str) -> None:
-    click.echo(f"Error: {name}: {reason}", err=True)

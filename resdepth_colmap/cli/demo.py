@@ -32,7 +32,7 @@ def demo(output: Path, **values: Any) -> None:
     config = build_config(SynthesisConfig, values)
     from resdepth_colmap.cli.log import BarProgress
     from resdepth_colmap.cli.printed import show_comparison, show_run
-    from resdepth_colmap.evaluation.depth.truth import compare_with_truth
+    from resdepth_colmap.report.image_maps import image_errors
     from resdepth_colmap.report.refine_and_report import refine_and_report
     from resdepth_colmap.synthetic.synthesize import synthesize
 
@@ -42,5 +42,5 @@ def demo(output: Path, **values: Any) -> None:
     result = refine_and_report(room, RunConfig(backend=StereoBackend.CPU), progress)
     images = result.refine.images
     kinds = {name: record["input"] for name, record in images.items()}
-    show_comparison(compare_with_truth(result.refine.output, kinds))
+    show_comparison(image_errors(result.refine.output, kinds))
     show_run(result)

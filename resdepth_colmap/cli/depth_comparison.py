@@ -1,6 +1,5 @@
-"""What `evaluate depth` and `evaluate eth3d` share: options, progress, the result."""
+"""What `evaluate depth` and `evaluate eth3d` share: options and evaluation."""
 
-import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -8,7 +7,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from resdepth_colmap.cli.command_line import command_line
-from resdepth_colmap.cli.options import Command, build_config
+from resdepth_colmap.cli.options import Command, build_config, config_options
+from resdepth_colmap.cli.results import (
+    UNRECORDED,
+    exit_if_failed,
+    result_options,
+    show_failure,
+    show_result,
+)
 from resdepth_colmap.config import RefineConfig, StereoBackend, StereoConfig
 from resdepth_colmap.evaluation.datasets.paper import PAPER_MAX_RESIDUAL
 
@@ -17,7 +23,7 @@ if TYPE_CHECKING:
     from resdepth_colmap.evaluation.depth.evaluation import EvaluationOptions
     from resdepth_colmap.evaluation.markdown import Measured
 
-NO_MATCHER_OPTIONS = (
+_IRRELEVANT = (
     "max_image_size",
     "min_triangulation_angle",
     "filter",
@@ -29,38 +35,50 @@ NO_MATCHER_OPTIONS = (
     "mask_path",
     "cache_size",
 )
-"""Those of StereoConfig that an unfiltered map of full size does not depend on."""
+"""Options of StereoConfig that do not change an unfiltered map of full size."""
 
-max_residual_option = click.option(
+_max_residual = click.option(
     "--max-residual",
     type=click.FloatRange(min=0),
     default=PAPER_MAX_RESIDUAL,
     show_default=True,
-    help="Larger errors, in workspace units, are left out of MAE, RMSE and MedAE; 0 = "
-    "none is.",
+    help="Leave larger errors, in workspace units, out of MAE, RMSE and MedAE; 0 = no "
+    "limit.",
 )
 
 
-_UNSAID = ("as_json", "output", "cache")  # they change no figure
+def evaluation_command_options(
+    cache_help: str, *skip: str
+) -> Callable[[Command], Command]:
+    """The options of refinement, matcher, errors, cache and result.
 
+    Args:
+        cache_help: Help text of --cache.
+        skip: Attributes of StereoConfig to leave out.
+    """
+    cache = click.option(
+        "--cache", type=click.Path(path_type=Path, file_okay=False), help=cache_help
+    )
+    refine = config_options(
+        RefineConfig,
+        "inner_iterations",
+        "outer_iterations",
+        "update_gating",
+        "weights",
+        "device",
+    )
+    stereo = config_options(StereoConfig, skip=(*_IRRELEVANT, *skip))
 
-def report_options(function: Command) -> Command:
-    """Give a command --json and --output."""
-    as_json = click.option(
-        "--json", "as_json", is_flag=True, help="Print JSON instead of tables."
-    )
-    output = click.option(
-        "--output",
-        type=click.Path(path_type=Path, dir_okay=False),
-        help="Write the JSON to this file, too.",
-    )
-    return as_json(output(function))
+    def decorate(function: Command) -> Command:
+        return refine(stereo(_max_residual(cache(result_options(function)))))
+
+    return decorate
 
 
 def evaluation_options(
     values: dict[str, Any], backend: StereoBackend, cache: Path | None
 ) -> "EvaluationOptions":
-    """The options of a comparison, from a command's values."""
+    """The options of an evaluation, from the values of a command."""
     refine = build_config(RefineConfig, values)
     stereo = build_config(StereoConfig, values)
     from resdepth_colmap.evaluation.depth.evaluation import EvaluationOptions
@@ -82,34 +100,27 @@ def run_evaluation(
     values: dict[str, Any],
     protocol: dict[str, Any] | None = None,
 ) -> None:
-    """Measure, print and write the result; exit code 1 if a scene is broken.
+    """Evaluate, print and write the result; exit code 1 if a scene is broken.
 
     Args:
         sources: The scenes.
-        options: How they are measured.
-        table: Makes tables of the result.
-        values: The command's values: as_json and output.
-        protocol: What else the result has to say of itself.
+        options: How they are evaluated.
+        table: Renders the result as tables.
+        values: The values of the command, with as_json and output.
+        protocol: How samples were chosen, for the result.
     """
     from resdepth_colmap.cli.log import BarProgress
-    from resdepth_colmap.evaluation.depth.evaluation import Listener, evaluate_scenes
-    from resdepth_colmap.io.files import write_whole
+    from resdepth_colmap.evaluation.depth.evaluation import evaluate_scenes
 
-    listener = Listener(on_failure=_say_failure, progress=BarProgress())
-    report = evaluate_scenes(sources, options, listener)
-    measured = {"command": command_line(skip=_UNSAID), **report.to_mapping()}
+    report = evaluate_scenes(sources, options, show_failure, BarProgress())
+    measured = {"command": command_line(skip=UNRECORDED), **report.to_mapping()}
     if protocol is not None:
         measured["protocol"] = protocol
-    text = json.dumps(measured, indent=2, ensure_ascii=False)
-    if values["output"]:
-        write_whole(values["output"], f"{text}\n".encode())
-    click.echo(text if values["as_json"] else table(measured))
-    if report.failed:
-        names = ", ".join(report.failed)
-        failed = f"{len(report.failed)} of {len(sources)} scenes failed: {names}"
-        click.echo(failed, err=values["as_json"])
-        click.get_current_context().exit(1)
-
-
-def _say_failure(name: str, reason: str) -> None:
-    click.echo(f"Error: {name}: {reason}", err=True)
+    as_json = values["as_json"]
+    show_result(
+        measured,
+        lambda result: click.echo(table(result)),
+        as_json=as_json,
+        output=values["output"],
+    )
+    exit_if_failed(report.failed, len(sources), "scenes", as_json=as_json)

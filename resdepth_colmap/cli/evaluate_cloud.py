@@ -1,24 +1,20 @@
 """The command `evaluate cloud`: a cloud against laser scans, by ETH3D's rules."""
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from resdepth_colmap.cli.options import build_config, command, config_options
+from resdepth_colmap.cli.results import (
+    parsed_tolerances,
+    result_options,
+    show_result,
+)
 from resdepth_colmap.evaluation.cloud.config import DEFAULT_TOLERANCES, CloudConfig
 
 if TYPE_CHECKING:
     from resdepth_colmap.evaluation.cloud.scores import CloudScores
-
-
-def _tolerances(_context: click.Context, _option: object, text: str) -> Any:
-    try:
-        values = {float(word) for word in text.replace(",", " ").split()}
-    except ValueError as error:
-        raise click.BadParameter(f"{text!r}: {error}.") from error
-    return tuple(sorted(values))
 
 
 @command(
@@ -31,22 +27,17 @@ def _tolerances(_context: click.Context, _option: object, text: str) -> Any:
     "--ground-truth",
     type=click.Path(path_type=Path),
     required=True,
-    help="ETH3D's scan_alignment.mlp, which names the scans beside it.",
+    help="ETH3D's scan_alignment.mlp, which lists the laser scans.",
 )
 @click.option(
     "--tolerances",
-    callback=_tolerances,
+    callback=parsed_tolerances,
     default=",".join(map(str, DEFAULT_TOLERANCES)),
     show_default=True,
-    help="Distances up to which a point is right, in metres, with commas between.",
+    help="Largest distances of a correct point, in metres, separated by commas.",
 )
 @config_options(CloudConfig, skip=("tolerances",))
-@click.option("--json", "as_json", is_flag=True, help="Print JSON instead of a table.")
-@click.option(
-    "--output",
-    type=click.Path(path_type=Path, dir_okay=False),
-    help="JSON file to write as well.",
-)
+@result_options
 def cloud(
     reconstruction: Path,
     ground_truth: Path,
@@ -56,30 +47,23 @@ def cloud(
 ) -> None:
     """Score RECONSTRUCTION, a PLY file, against the laser scans of a scene.
 
-    Accuracy is the share of its points that the scans confirm, completeness the share
-    of the scans that it reaches, both averaged over small voxels; what no laser has
-    seen does not count. The cloud has to be in metres in the frame of the scans: use
-    the poses that come with them.
+    Accuracy is the share of the points of the cloud that are near the scans,
+    completeness the share of the points of the scans that are near the cloud, both
+    averaged over voxels. Points that no laser beam has observed do not count. The cloud
+    has to be in metres in the frame of the scans: use the poses that come with them.
     """
     config = build_config(CloudConfig, values)
     from resdepth_colmap.cli.log import BarProgress
-    from resdepth_colmap.evaluation.cloud.files import score_cloud_file
-    from resdepth_colmap.io.files import write_whole
+    from resdepth_colmap.evaluation.cloud.laser_truth import score_cloud_file
 
     scores = score_cloud_file(reconstruction, ground_truth, config, BarProgress())
-    record = {
+    result = {
         "reconstruction": str(reconstruction),
         "ground_truth": str(ground_truth),
         "options": config.to_mapping(),
         **scores.to_mapping(),
     }
-    text = json.dumps(record, indent=2, ensure_ascii=False)
-    if output is not None:
-        write_whole(output, f"{text}\n".encode())
-    if as_json:
-        click.echo(text)
-    else:
-        _show(scores)
+    show_result(result, lambda _: _show(scores), as_json=as_json, output=output)
 
 
 def _show(scores: "CloudScores") -> None:

@@ -1,4 +1,4 @@
-"""The command `evaluate depth`: depth maps against their truth."""
+"""The command `evaluate depth`: depth maps against ground truth."""
 
 from pathlib import Path
 from typing import Any
@@ -6,14 +6,12 @@ from typing import Any
 import click
 
 from resdepth_colmap.cli.depth_comparison import (
-    NO_MATCHER_OPTIONS,
+    evaluation_command_options,
     evaluation_options,
-    max_residual_option,
-    report_options,
     run_evaluation,
 )
-from resdepth_colmap.cli.options import command, config_options
-from resdepth_colmap.config import RefineConfig, StereoBackend, StereoConfig
+from resdepth_colmap.cli.options import command
+from resdepth_colmap.config import StereoBackend
 
 
 @command(
@@ -28,30 +26,15 @@ from resdepth_colmap.config import RefineConfig, StereoBackend, StereoConfig
     required=True,
     type=click.Path(path_type=Path),
 )
-@config_options(
-    RefineConfig,
-    "inner_iterations",
-    "outer_iterations",
-    "update_gating",
-    "weights",
-    "device",
-)
-@config_options(StereoConfig, skip=NO_MATCHER_OPTIONS)
-@max_residual_option
-@click.option(
-    "--cache",
-    type=click.Path(path_type=Path, file_okay=False),
-    help="Folder that keeps matched depth for the next time.",
-)
-@report_options
+@evaluation_command_options("Folder that keeps matched depth for later runs.")
 def depth(scenes: tuple[Path, ...], cache: Path | None, **values: Any) -> None:
-    """Compare unfiltered, median-filtered and refined depth with the truth of SCENEs.
+    """Compare unfiltered, median-filtered and refined depth with ground truth.
 
     A SCENE is a dense workspace with ground_truth/IMAGE.bin (COLMAP's map format), a
     scene as Middlebury distributes it (calib.txt, im0.png, im1.png, disp0.pfm), or a
-    folder of these. The fullest depth maps in stereo/ are refined anew with these
-    options; where there are none, our PatchMatch makes them. Nothing in SCENE is
-    changed. A broken SCENE does not stop the others; the exit code is 1 then.
+    folder of these. The depth maps in stereo/ with the fewest holes are refined again
+    with these options; without any, PatchMatch on the CPU computes them. SCENE stays as
+    it is. A broken SCENE does not stop the others, but the exit code is 1.
     """
     options = evaluation_options(values, StereoBackend.CPU, cache)
     from resdepth_colmap.evaluation.datasets.scenes import scene_sources

@@ -1,4 +1,4 @@
-"""The command `evaluate eth3d`: the paper's comparison on ETH3D."""
+"""The command `evaluate eth3d`: the comparison of the paper on ETH3D."""
 
 from pathlib import Path
 from typing import Any
@@ -6,21 +6,19 @@ from typing import Any
 import click
 
 from resdepth_colmap.cli.depth_comparison import (
-    NO_MATCHER_OPTIONS,
+    evaluation_command_options,
     evaluation_options,
-    max_residual_option,
-    report_options,
     run_evaluation,
 )
-from resdepth_colmap.cli.options import command, config_options, enum_option
-from resdepth_colmap.config import RefineConfig, StereoBackend, StereoConfig
+from resdepth_colmap.cli.options import command, enum_option
+from resdepth_colmap.config import StereoBackend
 from resdepth_colmap.evaluation.datasets.paper import PAPER_IMAGE_WIDTH_PX
 
 CACHE_NAME = "resdepth-cache"
 
 
 @command(
-    "Compare with unfiltered COLMAP on ETH3D, as the paper does.",
+    "Compare depth maps on ETH3D by the protocol of the paper.",
     "evaluate eth3d ETH3D/",
     "evaluate eth3d ETH3D/ --scene office --scene pipes --output eth3d.json",
 )
@@ -31,19 +29,23 @@ CACHE_NAME = "resdepth-cache"
     type=click.Path(path_type=Path),
 )
 @click.option(
-    "--scene", "scenes", multiple=True, help="Compare this scene; may be repeated."
+    "--scene",
+    "scenes",
+    multiple=True,
+    help="Evaluate this scene; may be repeated.  [default: all]",
 )
 @click.option(
     "--pairs",
     "pairs_path",
     type=click.Path(path_type=Path),
-    help="File of stereo pairs: lines 'SCENE REFERENCE SOURCE'; else "
-    "ETH3D_ROOT/pairs.txt where it is there.",
+    help="File of stereo pairs, one line 'SCENE REFERENCE SOURCE' each.  [default: "
+    "ETH3D_ROOT/pairs.txt, if present]",
 )
 @click.option(
     "--num-pairs",
     type=click.IntRange(min=1),
-    help="Pairs of a scene that the file does not name; else as many as in the paper.",
+    help="Number of pairs of a scene that the file does not list.  [default: as in the "
+    "paper]",
 )
 @click.option(
     "--image-width",
@@ -58,36 +60,24 @@ CACHE_NAME = "resdepth-cache"
     "backend",
     kind=StereoBackend,
     default=StereoBackend.AUTO,
-    text="Whose PatchMatch: COLMAP's (needs CUDA), or ours on the CPU.",
+    text="The matcher: COLMAP's PatchMatch (needs CUDA), or PatchMatch on the CPU.",
 )
-@config_options(
-    RefineConfig,
-    "inner_iterations",
-    "outer_iterations",
-    "update_gating",
-    "weights",
-    "device",
+@evaluation_command_options(
+    "Folder that keeps matched depth for later runs.  "
+    f"[default: ETH3D_ROOT/{CACHE_NAME}]",
+    "max_num_sources",
 )
-@config_options(StereoConfig, skip=(*NO_MATCHER_OPTIONS, "max_num_sources"))
-@max_residual_option
-@click.option(
-    "--cache",
-    type=click.Path(path_type=Path, file_okay=False),
-    help="Folder that keeps matched depth, for a run to go on from; "
-    f"else ETH3D_ROOT/{CACHE_NAME}.",
-)
-@report_options
 def eth3d(
     root: Path, backend: StereoBackend, cache: Path | None, **values: Any
 ) -> None:
-    """Compare unfiltered, median-filtered and refined depth with ETH3D's truth.
+    """Compare unfiltered, median-filtered and refined depth with ETH3D's ground truth.
 
-    ETH3D_ROOT is the folder that the archives of the high-resolution multi-view scenes
-    were unpacked into: dslr_undistorted, dslr_jpg and dslr_depth of each
-    (https://www.eth3d.net/datasets); the environment variable RESDEPTH_ETH3D may
-    name it instead. Depth is matched in each pair's first image
-    against the second one alone. The table has the paper's figures beside it. A broken
-    scene does not stop the others; the exit code is 1 then.
+    ETH3D_ROOT is the folder with the unpacked archives of the high-resolution
+    multi-view scenes: dslr_undistorted, dslr_jpg and dslr_depth of each
+    (https://www.eth3d.net/datasets). Its default is the environment variable
+    RESDEPTH_ETH3D. The first image of each pair is matched against the second one
+    alone. The table lists the figures of the paper, too. A broken scene does not stop
+    the others, but the exit code is 1.
     """
     options = evaluation_options(values, backend, cache or root / CACHE_NAME)
     from resdepth_colmap.evaluation.datasets.eth3d import Eth3dOptions, eth3d_sources

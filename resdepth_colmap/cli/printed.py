@@ -9,10 +9,10 @@ if TYPE_CHECKING:
 
     from rich.table import Table
 
-    from resdepth_colmap.evaluation.depth.truth import Comparison
     from resdepth_colmap.evaluation.metrics.depth_metrics import DepthMetrics
     from resdepth_colmap.pipeline.info import Inspection
     from resdepth_colmap.pipeline.run import RunResult
+    from resdepth_colmap.report.image_maps import ImageErrors
 
 LABEL_WIDTH = 16
 
@@ -113,7 +113,7 @@ def _show_plan(found: "Inspection") -> None:
     show_line("memory", f"about {cost.memory_mb / 1024:.1f} GiB")
 
 
-def show_comparison(comparisons: "Sequence[Comparison]") -> None:
+def show_comparison(comparisons: "Sequence[ImageErrors]") -> None:
     """The error of each image's depth before and after, and the mean over them."""
     from rich.table import Table
 

@@ -1,4 +1,4 @@
-"""What `compare` prints of a workspace."""
+"""The tables that `compare` prints."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -7,27 +7,31 @@ import click
 
 from resdepth_colmap.cli.printed import show_line, show_table
 
-_FUSERS = {"open3d": "ours", "colmap": "COLMAP"}
+_FUSERS = {"open3d": "open3d", "colmap": "COLMAP"}
 
 
-def show_workspace(name: str, found: Mapping[str, Any]) -> None:
-    """All that was found out, as tables.
+def show_workspaces(result: Mapping[str, Any]) -> None:
+    """Print the tables of each workspace.
 
     Args:
-        name: Of the workspace.
-        found: `Comparison.to_mapping()`.
+        result: Of `compare_workspaces`.
     """
+    for name, found in result["workspaces"].items():
+        _show_workspace(name, found)
+
+
+def _show_workspace(name: str, found: Mapping[str, Any]) -> None:
     show_line("workspace", f"{name} ({len(found['views'])} views compared)")
     for method, facts in found["methods"].items():
         normals = f"normals: {facts['normals']}"
         show_line(method, f"{facts['kind']} maps, {normals}")
     for fuser, settings in found["fusion"].items():
-        said = ", ".join(f"{key} {value:g}" for key, value in settings.items())
-        show_line(f"fusion {fuser}", said)
+        values = ", ".join(f"{key} {value:g}" for key, value in settings.items())
+        show_line(f"fusion {fuser}", values)
     if found["truth"] is not None:
         truth = {k: v for k, v in found["truth"].items() if k != "kind"}
-        said = ", ".join(f"{key} {value:,}" for key, value in truth.items())
-        show_line("truth", f"{found['truth']['kind']}: {said}")
+        values = ", ".join(f"{key} {value:,}" for key, value in truth.items())
+        show_line("ground truth", f"{found['truth']['kind']}: {values}")
     for note in found["notes"]:
         show_line("note", note)
     _show_clouds(found["clouds"])
@@ -40,7 +44,7 @@ def _show_clouds(clouds: Mapping[str, Any]) -> None:
     table = Table(title="clouds")
     for header in ("fusion", "method"):
         table.add_column(header)
-    for header in ("points", "within", "accuracy", "complete", "F1"):
+    for header in ("points", "tolerance", "accuracy", "complete", "F1"):
         table.add_column(header, justify="right")
     notes: dict[str, list[str]] = {}
     for fuser, methods in clouds.items():
@@ -48,17 +52,17 @@ def _show_clouds(clouds: Mapping[str, Any]) -> None:
             for row in _cloud_rows(cloud):
                 table.add_row(_FUSERS[fuser], method, *row)
             if cloud["note"]:
-                said = f"{_FUSERS[fuser]}: {cloud['note']}"
-                notes.setdefault(said, []).append(method)
+                note = f"{_FUSERS[fuser]}: {cloud['note']}"
+                notes.setdefault(note, []).append(method)
         table.add_section()
     show_table(table)
-    for said, of_methods in notes.items():
-        show_line("note", f"{', '.join(of_methods)}: {said}.")
+    for note, of_methods in notes.items():
+        show_line("note", f"{', '.join(of_methods)}: {note}.")
 
 
 def _cloud_rows(cloud: Mapping[str, Any]) -> list[list[str]]:
-    scores, number = cloud["scores"], cloud["num_points"]
-    points = "-" if number is None else f"{number:,}"
+    scores, num_points = cloud["scores"], cloud["num_points"]
+    points = "-" if num_points is None else f"{num_points:,}"
     if scores is None:
         return [[points, "-", "-", "-", "-"]]
     keys = ("accuracy", "completeness", "f1")

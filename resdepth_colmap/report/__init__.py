@@ -1,1 +1,1 @@
-"""The page that shows what the refinement changed: one file, no network."""
+"""The report of a refinement: one HTML file that works offline."""

@@ -1,29 +1,29 @@
-"""How large pictures and cloud may be, so that the page stays under its limit."""
+"""Sizes of pictures and clouds that keep the page below its limit."""
 
 import dataclasses
 from typing import Self
 
 MOST_BYTES = 10_000_000
-"""The page in all."""
+"""Largest size of the page."""
 
 MOST_IMAGES = 300
-"""Images that are shown; of more, evenly chosen ones."""
+"""Largest number of images; of more, evenly spaced ones are shown."""
 
 _MOST_MAP_PIXELS = 640 * 480.0
 _FEW_IMAGES = 40
 _SAFETY = 0.93
 _LEAST_SHRINKING = 0.9
-_PHOTO_SIDES = (1280, 1.6)  # px; of the map's long side
+_PHOTO_SIDES = (1280, 1.6)  # in pixels; relative to the long side of the map
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Budget:
-    """Sizes of what is shown.
+    """Sizes of maps and clouds in the page.
 
     Attributes:
-        map_pixels: Pixels of each map, at most.
+        map_pixels: Largest number of pixels of a map.
         depth_step: Relative step of depth values.
-        num_points: Points of each cloud, at most.
+        num_points: Largest number of points of a cloud.
     """
 
     map_pixels: float
@@ -32,7 +32,7 @@ class Budget:
 
     @classmethod
     def of(cls, num_images: int) -> Self:
-        """What a page of so many images may have at best; few have finer values."""
+        """The largest sizes for a number of images; finer values for few images."""
         is_small = num_images <= _FEW_IMAGES
         return cls(
             map_pixels=_MOST_MAP_PIXELS,
@@ -41,15 +41,15 @@ class Budget:
         )
 
     def shrunk(self, num_bytes: float, available: float) -> "Budget":
-        """A budget by which pictures of so many bytes would fit into those available.
+        """A budget that shrinks pictures of `num_bytes` to the available bytes.
 
-        A small map needs more bytes a pixel than a large one; the safety margin covers
-        the step of one trial, not of many.
+        A small map needs more bytes per pixel than a large one; the safety margin
+        covers one such step.
         """
         factor = min(_LEAST_SHRINKING, _SAFETY * available / max(num_bytes, 1.0))
         return dataclasses.replace(self, map_pixels=self.map_pixels * max(factor, 1e-3))
 
     def photo_side_px(self, map_shape: tuple[int, ...]) -> int:
-        """Long side of the photo that goes with a map."""
+        """Long side of the photo of a map."""
         most_px, ratio = _PHOTO_SIDES
         return int(min(most_px, max(64.0, ratio * max(map_shape[:2]))))

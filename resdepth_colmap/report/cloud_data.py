@@ -1,4 +1,4 @@
-"""The fused clouds and the cameras, small enough for a page."""
+"""The fused clouds and the cameras, reduced to the size of a page."""
 
 import math
 from collections.abc import Sequence
@@ -8,13 +8,15 @@ import numpy as np
 import numpy.typing as npt
 import scipy.spatial
 
+from resdepth_colmap.geometry.pixels import CENTER_PX, index_K
+from resdepth_colmap.geometry.projection import pixel_rays
 from resdepth_colmap.io.png import encode_png
 from resdepth_colmap.io.point_cloud import PointCloud
 from resdepth_colmap.report.packing import MAX_VALUE, byte_planes
-from resdepth_colmap.scene import Camera, Matrix, View
+from resdepth_colmap.scene import Matrix, View
 
 SIZE = 10.0
-"""Longest side of the box of points in the page's own units."""
+"""Longest side of the box of points, in page units."""
 
 _ROBUST_PERCENT = (1.0, 99.0)
 _MARGIN = 0.5  # of the robust box, on each side
@@ -26,7 +28,7 @@ _ASPECT = 1.7
 _LOOK_DOWN = 0.25  # of the way ahead
 _LOOK_ASIDE = 0.2
 _PERCENT_IN_SIGHT = 94.0
-_POINTS_LOOKED_AT = 20_000
+_NUM_SAMPLES = 20_000
 _SPACINGS = (0.0003 * SIZE, 0.03 * SIZE)
 
 
@@ -34,11 +36,11 @@ Positions = npt.NDArray[np.float32]
 
 
 class CloudBox(NamedTuple):
-    """The part of space that is shown: without the few points far from all others.
+    """The part of space that is shown, without outliers.
 
     Attributes:
         center: In the world frame, shape (3,), float64.
-        scale: Page units for each workspace unit.
+        scale: Page units per workspace unit.
     """
 
     center: Matrix
@@ -46,7 +48,7 @@ class CloudBox(NamedTuple):
 
     @classmethod
     def of(cls, *clouds: PointCloud) -> Self:
-        """The box of what the clouds have in common; they hold at least one point."""
+        """The box of the clouds, which have at least one point."""
         points = np.concatenate([cloud.points for cloud in clouds]).astype(np.float64)
         low, high = np.percentile(points, _ROBUST_PERCENT, axis=0)
         low, high = low - _MARGIN * (high - low), high + _MARGIN * (high - low)
@@ -57,7 +59,7 @@ class CloudBox(NamedTuple):
         return cls((low + high) / 2, SIZE / extent)
 
     def shown(self, xyz_in_world: npt.ArrayLike) -> Matrix:
-        """Points in page units, the box's centre in the middle."""
+        """Points in page units, relative to the centre of the box."""
         shifted = np.asarray(xyz_in_world, np.float64) - self.center
         return np.asarray(shifted * self.scale, np.float64)
 
@@ -66,10 +68,10 @@ class PackedCloud(NamedTuple):
     """A cloud as two PNG files.
 
     Attributes:
-        points: Grey, shape (6, N): x high, y high, z high, x low, y low, z low; the
-            whole box is 0..65535.
+        points: Grey, shape (6, N): x high, y high, z high, x low, y low, z low;
+            the box is 0..65535.
         colors: RGB, shape (1, N, 3).
-        num_points: N.
+        num_points: Number of points N.
     """
 
     points: bytes
@@ -78,10 +80,10 @@ class PackedCloud(NamedTuple):
 
 
 def packed_cloud(cloud: PointCloud, box: CloudBox, most: int) -> PackedCloud | None:
-    """At most so many points of a cloud, ordered so that neighbours are neighbours.
+    """At most `most` points of a cloud, in the order of a Z-order curve.
 
     Returns:
-        The points inside the box; None if there is none.
+        The points inside of the box; None without any.
     """
     sample = cloud.sampled(most)
     unit = box.shown(sample.points) / SIZE + 0.5
@@ -98,11 +100,11 @@ def packed_cloud(cloud: PointCloud, box: CloudBox, most: int) -> PackedCloud | N
 
 
 def point_spacing(cloud: PointCloud, box: CloudBox, most: int) -> float:
-    """Median distance of the points that are shown to their nearest one, page units."""
+    """Median distance of the shown points to the nearest other, in page units."""
     shown = box.shown(cloud.sampled(most).points)
     if len(shown) < 2:
         return SIZE / 10
-    some = shown[:: max(1, len(shown) // _POINTS_LOOKED_AT)]
+    some = shown[:: max(1, len(shown) // _NUM_SAMPLES)]
     distance, _ = scipy.spatial.cKDTree(shown).query(some, k=2)
     return float(np.clip(np.median(distance[:, 1]), *_SPACINGS))
 
@@ -110,29 +112,29 @@ def point_spacing(cloud: PointCloud, box: CloudBox, most: int) -> float:
 def first_look(
     views: Sequence[View], points: Positions, box: CloudBox
 ) -> dict[str, Any]:
-    """Where to stand at first: about where the cameras are, to have most in sight.
+    """The first view of the cloud: from near the cameras, with most points in sight.
 
     Args:
         views: The cameras; at least one.
         points: The cloud in the world frame, shape (N, 3).
-        box: What is shown.
+        box: The part of space that is shown.
 
     Returns:
-        "eye", "target" and "up" in page units, the vertical field of view "fov_deg"
-        and the "aspect" that it was chosen for, for JSON.
+        "eye", "target" and "up" in page units, the vertical field of view "fov_deg" and
+        the "aspect" ratio, for JSON.
     """
     poses = np.array([view.cam_from_world for view in views])
     right, down, forward = (_direction(poses[:, axis, :3]) for axis in range(3))
     direction = forward + _LOOK_DOWN * down - _LOOK_ASIDE * right
     direction /= np.linalg.norm(direction)
-    shown = box.shown(points[:: max(1, len(points) // _POINTS_LOOKED_AT)])
+    shown = box.shown(points[:: max(1, len(points) // _NUM_SAMPLES)])
     target = np.median(shown, axis=0)
     side = np.cross(direction, -down)
     side /= np.linalg.norm(side)
     top = np.cross(side, direction)
     tangent = math.tan(math.radians(_FOV_DEG / 2))
     offset = shown - target
-    # The distance from which a point is in sight, by its height, and by its width.
+    # Distances from which a point is in sight, vertically and horizontally.
     height = np.abs(offset @ top) / tangent
     width = np.abs(offset @ side) / (tangent * _ASPECT)
     needed = np.maximum(height, width) - offset @ direction
@@ -147,10 +149,13 @@ def first_look(
 
 
 def camera_outline(view: View, box: CloudBox) -> list[list[float]]:
-    """Apex and four corners of a camera's pyramid, in page units."""
+    """Apex and four corners of the pyramid of a camera, in page units."""
     camera = view.camera
     length = _CAMERA_SIZE * SIZE / box.scale
-    corners = _corner_rays(camera) * length
+    right, bottom = camera.width_px - CENTER_PX, camera.height_px - CENTER_PX
+    left = top = -CENTER_PX
+    xy = [[left, top], [right, top], [right, bottom], [left, bottom]]
+    corners = pixel_rays(xy, index_K(camera)) * length
     rotation, translation = view.cam_from_world[:, :3], view.cam_from_world[:, 3]
     corners_in_world = (corners - translation) @ rotation
     outline = np.vstack([view.center_in_world, corners_in_world])
@@ -158,18 +163,10 @@ def camera_outline(view: View, box: CloudBox) -> list[list[float]]:
 
 
 def _direction(directions: Matrix) -> Matrix:
-    """The mean of directions; the first, where they cancel out, as round an object."""
+    """The mean direction; the first one if they cancel out, as around an object."""
     mean = directions.mean(axis=0)
     length = float(np.linalg.norm(mean))
     return np.asarray(mean / length if length > 0.3 else directions[0], np.float64)
-
-
-def _corner_rays(camera: Camera) -> Matrix:
-    left, right = -camera.cx / camera.fx, (camera.width_px - camera.cx) / camera.fx
-    top, bottom = -camera.cy / camera.fy, (camera.height_px - camera.cy) / camera.fy
-    return np.array(
-        [[left, top, 1], [right, top, 1], [right, bottom, 1], [left, bottom, 1]]
-    )
 
 
 def _rounded(xyz: Matrix) -> list[float]:
@@ -177,7 +174,7 @@ def _rounded(xyz: Matrix) -> list[float]:
 
 
 def _morton(values: npt.NDArray[np.uint16]) -> npt.NDArray[np.uint64]:
-    """Place of each point on the Z-order curve, from the top 10 bits of x, y and z."""
+    """Index of each point on the Z-order curve, from the top 10 bits of x, y and z."""
     code = np.zeros(len(values), np.uint64)
     for axis in range(3):
         coordinate = (values[:, axis] >> 6).astype(np.uint64)

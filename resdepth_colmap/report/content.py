@@ -1,4 +1,4 @@
-"""What goes into the page: facts for JSON, and blocks of pictures and clouds."""
+"""The content of the page: facts for JSON, and blocks of pictures and clouds."""
 
 import base64
 import dataclasses
@@ -36,7 +36,7 @@ CONFIDENCE_COLORS = "viridis"
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Content:
-    """Part of a page.
+    """A part of the page.
 
     Attributes:
         facts: Plain values for the page's JSON.
@@ -58,10 +58,10 @@ def image_content(
     """Photo and maps of one image.
 
     Args:
-        index: Its place among those shown.
-        maps: Its maps, larger than shown or not.
-        facts: What is said of it.
-        budget: How large the maps may be.
+        index: Index of the image among those shown.
+        maps: Its maps, of any size.
+        facts: Its facts.
+        budget: Sizes of the maps.
     """
     small = maps.sampled(budget.map_pixels)
     code = DepthCode.of(budget.depth_step, small.before, small.after, small.truth)
@@ -90,7 +90,7 @@ def image_content(
 def cloud_content(
     after: PointCloud, before: PointCloud | None, views: Sequence[View], budget: Budget
 ) -> Content:
-    """Both clouds, the cameras, and where to look from."""
+    """Both clouds, the cameras, and the first view."""
     clouds = {"after": after, "before": before}
     known = {name: c for name, c in clouds.items() if c is not None and len(c)}
     box = CloudBox.of(*known.values())
@@ -113,7 +113,7 @@ def cloud_content(
 
 
 def color_tables() -> dict[str, Any]:
-    """The colours that all pictures of this package use, 256 RGB values each."""
+    """The colour maps of all pictures of this package, 256 RGB values each."""
     names = {
         "depth": DEPTH_COLORS,
         "difference": DIFFERENCE_COLORS,

@@ -1,4 +1,4 @@
-"""What the page says in words and numbers, out of the run record and the maps."""
+"""The texts and numbers of the page, from the run record and the maps."""
 
 import collections
 import math
@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from resdepth_colmap.evaluation.metrics.depth_metrics import depth_metrics
 from resdepth_colmap.report.image_maps import ImageMaps
 from resdepth_colmap.viz.colormaps import (
     DepthScale,
@@ -15,19 +14,20 @@ from resdepth_colmap.viz.colormaps import (
     relative_difference,
 )
 
-MOST_NAMED = 100
+MAX_NUM_NAMES = 100
 _DIGITS = 6
 _OVERALL = ("mae", "rmse", "medae", "bad_1", "bad_2")
 
 Record = Mapping[str, Any]
-"""A run record, or a part of it, as it was read."""
+"""A run record, or a part of it."""
 
 
 def image_facts(maps: ImageMaps, record: Record) -> dict[str, Any]:
-    """What is said of one image, all of it computed from the full maps."""
+    """The facts of one image, computed from the full maps."""
     scale = DepthScale.of(maps.after, maps.before)
     change = relative_difference(maps.before, maps.after)
     size = np.abs(change[np.isfinite(change)])
+    errors = maps.errors
     height_px, width_px = maps.before.shape
     return {
         "name": maps.name,
@@ -40,22 +40,22 @@ def image_facts(maps: ImageMaps, record: Record) -> dict[str, Any]:
         "input": str(record.get("input", "")),
         "sources": _sources(record),
         "seconds": _number(record.get("seconds")),
-        "metrics": _metrics(maps),
+        "metrics": errors and [errors.before.to_mapping(), errors.after.to_mapping()],
     }
 
 
 def summary_facts(
     record: Record, images: Sequence[Record], num_pixels: int
 ) -> dict[str, Any]:
-    """What is said of the whole workspace.
+    """The facts of the workspace.
 
     Args:
         record: The run record.
         images: The facts of each image.
-        num_pixels: Pixels of all refined maps.
+        num_pixels: Number of pixels of all refined maps.
 
     Returns:
-        Plain values; pairs are before and after, None = not known.
+        Plain values; pairs are before and after, None = unknown.
     """
     records = [r for r in _mapping(record, "images").values() if isinstance(r, Mapping)]
     fuse, fuse_before = _mapping(record, "fuse"), _mapping(record, "fuse_before")
@@ -63,7 +63,7 @@ def summary_facts(
         "num_images": len(records),
         "coverage": [_mean(records, f"filled_{when}") for when in ("before", "after")],
         "agreement": [_agreeing(f, f.get("num_pixels")) for f in (fuse_before, fuse)],
-        "confirmed": [_agreeing(f, num_pixels) for f in (fuse_before, fuse)],
+        "consistent": [_agreeing(f, num_pixels) for f in (fuse_before, fuse)],
         "num_views_needed": _number(fuse.get("num_views_needed")),
         "points": [
             _number(fuse.get("points_before_refinement")),
@@ -88,18 +88,18 @@ def summary_facts(
 
 
 def left_out_facts(left_out: Mapping[str, str]) -> list[dict[str, Any]]:
-    """Reasons, each with the images it keeps from being shown (some of very many)."""
+    """Reasons, each with the number of images left out and the names of the first."""
     names = collections.defaultdict(list)
     for name, reason in left_out.items():
         names[reason].append(name)
     return [
-        {"reason": reason, "number": len(found), "names": found[:MOST_NAMED]}
-        for reason, found in list(names.items())[:MOST_NAMED]
+        {"reason": reason, "count": len(found), "names": found[:MAX_NUM_NAMES]}
+        for reason, found in list(names.items())[:MAX_NUM_NAMES]
     ]
 
 
 def rounded(value: Any) -> Any:
-    """The same with numbers of a few digits, ready for JSON: NaN becomes None."""
+    """A value with numbers of six digits, ready for JSON; NaN becomes None."""
     if isinstance(value, float):
         return float(f"{value:.{_DIGITS}g}") if math.isfinite(value) else None
     if isinstance(value, Mapping):
@@ -107,17 +107,6 @@ def rounded(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [rounded(item) for item in value]
     return value
-
-
-def _metrics(maps: ImageMaps) -> list[dict[str, float | int | None]] | None:
-    """Errors before and after; none is discarded: rooms have no far background."""
-    truth = maps.truth
-    if truth is None:
-        return None
-    return [
-        depth_metrics(depth, truth, max_residual=None).to_mapping()
-        for depth in (maps.before, maps.after)
-    ]
 
 
 def _mean_metrics(images: Sequence[Record]) -> list[dict[str, float | None]] | None:
@@ -138,13 +127,13 @@ def _sources(record: Record) -> list[dict[str, Any]]:
 
 
 def _agreeing(fuse: Record, num_pixels: Any) -> float | None:
-    """Share of pixels that other views confirm; None where nobody counted."""
+    """Share of pixels that are consistent in the views; None = not counted."""
     counts = [_number(fuse.get(key)) for key in ("num_points", "num_explained")]
-    number = _number(num_pixels)
+    total = _number(num_pixels)
     # COLMAP's fusion counts no explained pixels: 0 of them means unknown.
-    if not number or not counts[1] or counts[0] is None:
+    if not total or not counts[1] or counts[0] is None:
         return None
-    return (counts[0] + counts[1]) / number
+    return (counts[0] + counts[1]) / total
 
 
 def _mapping(record: Record, key: str) -> Record:

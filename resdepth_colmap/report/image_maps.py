@@ -1,12 +1,13 @@
-"""The maps of one image as the report needs them, and the same made smaller."""
+"""The maps of one image in the report, and their reduced size."""
 
 import dataclasses
 import math
-
-import numpy as np
-import numpy.typing as npt
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
 
 from resdepth_colmap.errors import WorkspaceError
+from resdepth_colmap.evaluation.metrics.depth_metrics import DepthMetrics, depth_metrics
 from resdepth_colmap.geometry.resize import nearest_resized
 from resdepth_colmap.io.colmap.depth_map import read_depth_map
 from resdepth_colmap.io.colmap.output import OutputWorkspace
@@ -17,15 +18,15 @@ from resdepth_colmap.scene import ColorImage, DepthMap, FloatMap
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class ImageMaps:
-    """What is known of one image; all maps have one size, the photo may be larger.
+    """Photo and maps of one image; the maps have one size, the photo may differ.
 
     Attributes:
         name: Image name.
         rgb: The photo, shape (h, w, 3).
         before: Initial depth, shape (H, W), in workspace units; 0 = no depth.
         after: Refined depth, likewise.
-        confidence: In 0..1, shape (H, W); None where the network gave none.
-        truth: True depth, shape (H, W), 0 = not known; None where it is not known.
+        confidence: In 0..1, shape (H, W); None without.
+        truth: True depth, shape (H, W), 0 = unknown; None without ground truth.
     """
 
     name: str
@@ -35,8 +36,19 @@ class ImageMaps:
     confidence: FloatMap | None = None
     truth: DepthMap | None = None
 
+    @property
+    def errors(self) -> "ImageErrors | None":
+        """Errors against ground truth, without a limit; None without ground truth."""
+        if self.truth is None:
+            return None
+        before, after = (
+            depth_metrics(depth, self.truth, max_residual=None)
+            for depth in (self.before, self.after)
+        )
+        return ImageErrors(self.name, before, after)
+
     def sampled(self, num_pixels: float) -> "ImageMaps":
-        """The maps with at most so many pixels; each is one of the full map's."""
+        """The maps with at most `num_pixels` pixels, sampled at the nearest pixels."""
         height_px, width_px = smaller_size(self.before.shape, num_pixels)
         size = (width_px, height_px)
         return dataclasses.replace(
@@ -48,14 +60,38 @@ class ImageMaps:
         )
 
 
+class ImageErrors(NamedTuple):
+    """Errors of the depth of one image, before and after the refinement."""
+
+    name: str
+    before: DepthMetrics
+    after: DepthMetrics
+
+
+def image_errors(
+    output: OutputWorkspace, kinds: Mapping[str, str]
+) -> list[ImageErrors]:
+    """The errors of the images with ground truth.
+
+    Args:
+        output: Has the refined maps; its source has `ground_truth/`.
+        kinds: The kind of the initial map, by image name.
+
+    Raises:
+        WorkspaceError: If a file is missing or broken, or two maps differ in size.
+    """
+    errors = (load_maps(output, name, kind).errors for name, kind in kinds.items())
+    return [it for it in errors if it is not None]
+
+
 def load_maps(output: OutputWorkspace, name: str, kind: str) -> ImageMaps:
     """Read the maps of one image.
 
     Args:
-        output: Where the refined maps are; its source has photo, initial map and, where
-            it is known, the truth (taken at the size of the maps).
+        output: Has the refined maps; its source the photo, the initial map and maybe
+            ground truth, which is resized to the maps.
         name: Image name.
-        kind: The kind of map that was refined.
+        kind: The kind of the initial map.
 
     Raises:
         WorkspaceError: If a file is missing or broken, or two maps differ in size.
@@ -63,38 +99,26 @@ def load_maps(output: OutputWorkspace, name: str, kind: str) -> ImageMaps:
     source = output.source
     after_path = output.depth_map_path(name)
     after = read_depth_map(after_path)
-    before_path = map_path(source, name, kind)
-    before = read_depth_map(before_path)
-    if before.shape != after.shape:
-        raise WorkspaceError(
-            f"{after_path}: {_size(after)} px, but the map that it was refined from "
-            f"has {_size(before)}; refine it again with --overwrite."
-        )
-    confidence = None
+    before = read_depth_map(map_path(source, name, kind))
+    _check_size(after_path, after, "the initial map", before)
     confidence_path = output.confidence_map_path(name)
-    if confidence_path.is_file():
-        confidence = read_depth_map(confidence_path)  # the same format
-        if confidence.shape != after.shape:
-            raise WorkspaceError(
-                f"{confidence_path}: {_size(confidence)} px, but the depth map has "
-                f"{_size(after)}; refine it again with --overwrite."
-            )
-    truth = None
-    truth_path = source.truth_path(name)
-    if truth_path.is_file():
-        truth = nearest_resized(read_depth_map(truth_path), after.shape[::-1])
+    confidence = _read_if_present(confidence_path)
+    if confidence is not None:
+        _check_size(confidence_path, confidence, "the depth map", after)
+    truth = _read_if_present(source.truth_path(name))
+    height_px, width_px = after.shape
     return ImageMaps(
         name=name,
         rgb=read_rgb(source.image_path(name)),
         before=before,
         after=after,
         confidence=confidence,
-        truth=truth,
+        truth=_resized_or_none(truth, (width_px, height_px)),
     )
 
 
 def smaller_size(shape: tuple[int, ...], num_pixels: float) -> tuple[int, int]:
-    """Height and width of that form with at most so many pixels, at least 1 x 1."""
+    """Height and width of at most `num_pixels` pixels and at least 1 x 1."""
     height_px, width_px = shape[:2]
     scale = min(1.0, math.sqrt(num_pixels / (height_px * width_px)))
     return max(1, math.floor(height_px * scale)), max(1, math.floor(width_px * scale))
@@ -106,5 +130,14 @@ def _resized_or_none(
     return None if values is None else nearest_resized(values, size_px)
 
 
-def _size(values: npt.NDArray[np.float32]) -> str:
-    return f"{values.shape[1]} x {values.shape[0]}"
+def _read_if_present(path: Path) -> FloatMap | None:
+    return read_depth_map(path) if path.is_file() else None
+
+
+def _check_size(path: Path, values: FloatMap, other_name: str, other: FloatMap) -> None:
+    if values.shape != other.shape:
+        sizes = [f"{it.shape[1]} x {it.shape[0]}" for it in (values, other)]
+        raise WorkspaceError(
+            f"{path}: {sizes[0]} px, but {other_name} has {sizes[1]}; refine it again "
+            "with --overwrite."
+        )

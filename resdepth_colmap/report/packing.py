@@ -1,7 +1,7 @@
-"""Numbers as PNG files: small, exact, and decoded by the page itself.
+"""Numbers as PNG files: small, exact, and decoded by the page.
 
-16-bit values go into an 8-bit grey PNG of twice the height, the high bytes above the
-low ones: about a tenth smaller than a 16-bit PNG.
+16-bit values become an 8-bit grey PNG of twice the height, the high bytes above the low
+ones: about a tenth smaller than a 16-bit PNG.
 """
 
 import io
@@ -21,11 +21,11 @@ _JPEG_QUALITY = 80
 
 
 class DepthCode(NamedTuple):
-    """Depth as whole numbers: depth = nearest * exp((value - 1) * step), 0 = none.
+    """Depth as integers: depth = nearest * exp((value - 1) * step), 0 = none.
 
     Attributes:
         nearest: Depth of the value 1, in workspace units.
-        step: Relative difference of neighbouring values; the error is half of it.
+        step: Relative step of the values; the error is half of it.
     """
 
     nearest: float
@@ -33,7 +33,7 @@ class DepthCode(NamedTuple):
 
     @classmethod
     def of(cls, step: float, *maps: DepthMap | None) -> "DepthCode":
-        """The code of several maps, so that equal depths have equal values."""
+        """One code for several maps, so that equal depths have equal values."""
         least = [float(m[m > 0].min()) for m in maps if m is not None and (m > 0).any()]
         return cls(min(least, default=1.0), step)
 
@@ -53,7 +53,7 @@ def packed_confidence(confidence: FloatMap) -> bytes:
 
 
 def packed_photo(rgb: ColorImage, long_side_px: int) -> bytes:
-    """The JPEG of a photo, at most so large."""
+    """The JPEG of a photo with a bounded long side."""
     height_px, width_px = rgb.shape[:2]
     if max(height_px, width_px) > long_side_px:
         rgb = resized(rgb, *fitted_size((height_px, width_px), long_side_px))

@@ -1,4 +1,4 @@
-"""The page: a template, styles and scripts of this package, and the data in it."""
+"""The page: template, styles and scripts of this package, and its data."""
 
 import base64
 import html
@@ -27,16 +27,16 @@ SCRIPTS = (
 )
 
 Blocks = Mapping[str, bytes]
-"""Binary data by the id that the scripts look it up by."""
+"""Binary data by the id of its element."""
 
 
 def render_page(title: str, data: Mapping[str, Any], blocks: Blocks) -> str:
-    """The whole page as text; it asks for nothing from any network.
+    """The page as text; it loads nothing from the network.
 
     Args:
-        title: What the workspace is called; any text.
-        data: What the scripts read, plain values; any text may be in it.
-        blocks: What they decode when it is looked at; ids are ours.
+        title: Name of the workspace; any text.
+        data: Plain values for the scripts, with any text.
+        blocks: Data that the scripts decode on demand, by valid ids.
     """
     template = string.Template(read_asset(TEMPLATE))
     return template.substitute(
@@ -51,9 +51,9 @@ def render_page(title: str, data: Mapping[str, Any], blocks: Blocks) -> str:
 
 
 def safe_json(data: Mapping[str, Any]) -> str:
-    """JSON that may stand in a script element, whatever its strings hold.
+    """JSON that is safe in a script element, with any strings.
 
-    It is ASCII and has no "<": nothing in it can end the element or open a comment, and
+    It is ASCII without "<", so it can neither end the element nor open a comment, and
     names that are not valid Unicode survive.
     """
     text = json.dumps(data, allow_nan=False, separators=(",", ":"))

@@ -1,4 +1,4 @@
-"""The whole road and the page that shows it: what the command `refine` does."""
+"""The command `refine`: refinement, fusion and report."""
 
 import dataclasses
 import time
@@ -21,15 +21,14 @@ def refine_and_report(
     Args:
         path: The workspace, or a parent of it.
         config: Options; None = the defaults.
-        progress: Is told of each stage.
+        progress: Reports the progress of each stage.
 
     Raises:
-        ResDepthError: As `run_refine` does; where only the cloud failed, the report is
-            there.
+        ResDepthError: As `run_refine`; after a failed fusion the report exists.
     """
     try:
         result = run_refine(path, config, progress)
-    except FusionError:  # maps and record are there
+    except FusionError:  # maps and record exist
         _report(path, progress)
         raise
     report_path = _report(path, progress)
@@ -37,7 +36,7 @@ def refine_and_report(
 
 
 def _report(path: Path, progress: Progress | None) -> Path:
-    """Write the report, and its time into the run record."""
+    """Write the report, and add its seconds to the run record."""
     start = time.perf_counter()
     report_path = write_report(path, progress)
     record_path = OutputWorkspace(source=open_workspace(path)).record_path

@@ -1,4 +1,4 @@
-"""Stage "report": the page of a workspace, out of its maps, cloud and run record."""
+"""The stage "report": a page from maps, cloud and run record of a workspace."""
 
 import logging
 from collections.abc import Mapping
@@ -40,12 +40,11 @@ REPORT_NAME = "report.html"
 def write_report(path: Path, progress: Progress | None = None) -> Path:
     """Write the report of a refined workspace.
 
-    An image whose maps have vanished or do not belong together is left out, and the
-    page says why.
+    An image with missing or mismatched maps is left out, and the page gives the reason.
 
     Args:
         path: The workspace, or a parent of it.
-        progress: Is told of each image.
+        progress: Reports the progress.
 
     Returns:
         The page, `resdepth/report.html`.
@@ -68,7 +67,7 @@ def write_report(path: Path, progress: Progress | None = None) -> Path:
 
 
 class _Report:
-    """One report: what it is made of, and what had to be left out."""
+    """A report: its images, and the images that were left out."""
 
     def __init__(
         self,
@@ -89,7 +88,7 @@ class _Report:
         budget = Budget.of(len(shown))
         cloud = self._cloud(budget)
         fixed = len(self._page([], cloud))
-        budget = self._tried(shown, budget, MOST_BYTES - fixed)
+        budget = self._fitted(shown, budget, MOST_BYTES - fixed)
         while True:
             contents = self._image_contents(shown, budget)
             page = self._page(contents, cloud)
@@ -118,8 +117,8 @@ class _Report:
             blocks.update(content.blocks)
         return render_page(title, rounded(data), blocks)
 
-    def _tried(self, shown: list[str], budget: Budget, available: float) -> Budget:
-        """A budget by which some of the images take no more than their share."""
+    def _fitted(self, shown: list[str], budget: Budget, available: float) -> Budget:
+        """A budget with which a few of the images need no more than their share."""
         names = evenly_chosen(shown, _NUM_TRIED)
         tried = [maps for maps in map(self._load, names) if maps is not None]
         share = available * len(tried) / len(shown)
@@ -152,7 +151,7 @@ class _Report:
         return contents
 
     def _load(self, name: str) -> ImageMaps | None:
-        """The maps of an image; None if they cannot be had, which is said once."""
+        """The maps of an image; None with one warning if they cannot be read."""
         if name in self.left_out:
             return None
         try:
@@ -174,7 +173,7 @@ class _Report:
 
 _NUM_TRIED = 4
 _MOST_TRIALS = 20
-_SPACE_FOR_FACTS = {"facts": " " * 1200}  # of one image, in the page's JSON
+_SPACE_FOR_FACTS = {"facts": " " * 1200}  # of one image, in the JSON of the page
 
 
 def _refined_images(

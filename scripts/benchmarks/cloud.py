@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from resdepth_colmap.evaluation.cloud.config import CloudConfig
-from resdepth_colmap.evaluation.cloud.files import score_cloud_file
+from resdepth_colmap.evaluation.cloud.laser_truth import score_cloud_file
 from resdepth_colmap.io.point_cloud import PointCloud, write_cloud
 from resdepth_colmap.versions import peak_memory_mb
 from scripts.benchmarks.record import parser, rounded, stamp, write

@@ -60,7 +60,7 @@ def test_a_hole_lowers_coverage_and_completeness_not_accuracy(tmp_path: Path) ->
     assert means["filtered"]["coverage"] == pytest.approx(2 / 3)
     assert means["filtered"]["right_1"] == pytest.approx(2 / 3)
     assert means["filtered"]["right_1_common"] == 1
-    assert means["filtered"]["confirmed"] < means["refined"]["confirmed"]
+    assert means["filtered"]["consistent"] < means["refined"]["consistent"]
 
 
 def test_wrong_depth_is_seen_by_every_measure_but_coverage(tmp_path: Path) -> None:
@@ -74,10 +74,10 @@ def test_wrong_depth_is_seen_by_every_measure_but_coverage(tmp_path: Path) -> No
     assert paired["right_1"]["views"]["num_better"] == 5
     # The tiles are 64 px and the rest: of a view 80 px wide, the right one was right.
     assert paired["right_1"]["tiles"]["num_better"] == 5
-    assert any("filtered arm" in note for note in found["notes"])
+    assert any(note.startswith("filtered: ") for note in found["notes"])
 
 
-def test_the_same_maps_in_two_arms_do_not_differ(tmp_path: Path) -> None:
+def test_the_same_maps_by_two_methods_do_not_differ(tmp_path: Path) -> None:
     scene = compared_workspace(tmp_path / "scene", unfiltered=exact, filtered=None)
     found = measured(scene)
     assert found["methods"]["unfiltered"]["kind"] == "photometric"
@@ -98,7 +98,7 @@ def test_nothing_of_the_workspace_is_touched(tmp_path: Path) -> None:
     assert contents(scene) == before
 
 
-def test_tables_settings_and_arms_are_printed(tmp_path: Path) -> None:
+def test_tables_settings_and_methods_are_printed(tmp_path: Path) -> None:
     output = tmp_path / "new" / "compare.json"
     scene = compared_workspace(tmp_path / "scene")
     result = compare(scene, "--min-num-views", 2, "--output", output)
@@ -118,10 +118,10 @@ def test_tolerances_are_in_units_of_the_workspace(tmp_path: Path) -> None:
     scene = compared_workspace(tmp_path / "scene", unfiltered=None)
     found = measured(scene, *ALL_VIEWS, "--tolerances", "0.5,0.1")
     assert found["clouds"]["open3d"]["filtered"]["scores"]["tolerances"] == [0.1, 0.5]
-    assert any("unfiltered arm" in note for note in found["notes"])
+    assert any(note.startswith("unfiltered: ") for note in found["notes"])
 
 
-def test_the_kinds_of_the_arms_can_be_given(tmp_path: Path) -> None:
+def test_the_kinds_of_the_methods_can_be_given(tmp_path: Path) -> None:
     scene = compared_workspace(tmp_path / "scene", unfiltered=with_hole)
     found = measured(scene)
     assert set(found["methods"]) == {"filtered", "refined"}
@@ -143,7 +143,7 @@ def test_without_truth_no_score_and_no_accuracy_is_claimed(tmp_path: Path) -> No
     assert found["measures"]["refined"]["right_1"] is None
     assert found["measures"]["refined"]["points_odd"] == 1
     assert found["measures"]["unfiltered"]["points_odd"] < 0.8
-    assert any("none of which is an accuracy" in note for note in found["notes"])
+    assert any("none of them is an accuracy" in note for note in found["notes"])
     assert "accuracy" not in " ".join(json.dumps(found["measures"]).split())
 
 
@@ -175,7 +175,7 @@ def test_an_empty_fusion_scores_0_with_a_word(tmp_path: Path) -> None:
 def test_truth_in_other_units_is_said(tmp_path: Path) -> None:
     scene = compared_workspace(tmp_path / "scene", truth=1000)
     result = compare(scene)
-    assert "0.001 times the true one" in result.stdout
+    assert "0.001 times the true depth" in result.stdout
     assert "other units" in result.stdout
 
 

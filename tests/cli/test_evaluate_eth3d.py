@@ -1,5 +1,6 @@
 """The command `evaluate eth3d`, whole, on a rendered scene in ETH3D's formats."""
 
+import functools
 import json
 import shutil
 from collections.abc import Callable
@@ -57,8 +58,10 @@ def fill_cache(folder: Path, rendered: RenderedEth3d) -> None:
         index = IMAGES.index(sample.name.split()[0])
         name = cache_name(source.name, sample.name, StereoBackend.CPU)
         views = (sample.reference, *sample.sources)
-        matching = Matching(depth=rendered.depth(index, camera), cpu_s=1.0)
-        MatchCache(folder=folder).add(name, views, sample.depth_range, STEREO, matching)
+        match = functools.partial(
+            Matching, depth=rendered.depth(index, camera), cpu_s=1.0
+        )
+        MatchCache(folder=folder).get(name, views, sample.depth_range, STEREO, match)
 
 
 def test_depth_that_is_right_scores_nothing_but_the_pixel_grid(
@@ -236,7 +239,7 @@ def test_a_scene_that_is_missing_is_named(
     result = evaluate(tmp_path, rendered.path.parent, *scenes, *options)
     assert result.exit_code == 1
     assert "Error: kicker: " in result.stderr
-    assert "no scene kicker in it; there are: office" in result.stderr
+    assert "no scene kicker; there are: office" in result.stderr
     assert "| office | refined |" in result.stdout
 
 

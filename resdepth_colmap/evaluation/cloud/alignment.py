@@ -1,4 +1,4 @@
-"""Whether a cloud can be in the frame and the units of the scans at all."""
+"""A warning for clouds in other units or another frame than the laser scans."""
 
 import logging
 
@@ -9,19 +9,19 @@ from scipy.spatial import cKDTree
 logger = logging.getLogger(__name__)
 
 MAX_DISTANCE = 0.05
-"""Median distance from the scans, of their extent, that makes a cloud suspicious."""
+"""Largest median distance from the scans, relative to their extent."""
 
 MAX_RATIO = 10.0
-"""Ratio of the extents of cloud and scans, either way, that does so too."""
+"""Largest ratio of the extents of cloud and scans, either way."""
 
 _NUM_SAMPLES = 20_000
-_NUM_WITNESSES = 1_000
+_NUM_QUERIES = 1_000
 
 Points = npt.NDArray[np.float32]
 
 
 def warn_of_misfit(points: Points, scan_points: Points) -> None:
-    """Log a line if a cloud is in other units than the scans, or somewhere else.
+    """Log a warning if a cloud is in other units than the scans, or elsewhere.
 
     Args:
         points: Coordinates of the cloud, shape (N, 3), finite.
@@ -31,11 +31,11 @@ def warn_of_misfit(points: Points, scan_points: Points) -> None:
     if len(points) == 0:
         logger.warning("the cloud has no point; all scores are 0.")
         return
-    witnesses = _sampled(points, _NUM_WITNESSES)
+    queries = _sampled(points, _NUM_QUERIES)
     samples = _sampled(scan_points, _NUM_SAMPLES)
-    distances, _ = cKDTree(samples).query(witnesses, eps=0.1)
+    distances, _ = cKDTree(samples).query(queries, eps=0.1)
     median_m = float(np.median(distances))
-    cloud_m, scans_m = _extent(witnesses), _extent(samples)
+    cloud_m, scans_m = _extent(queries), _extent(samples)
     is_near = median_m <= MAX_DISTANCE * scans_m
     is_alike = scans_m <= MAX_RATIO * cloud_m and cloud_m <= MAX_RATIO * scans_m
     if not (is_near and is_alike):

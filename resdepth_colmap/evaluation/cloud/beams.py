@@ -1,9 +1,9 @@
-"""What the beams of a laser scanner say of points: right, in free space, or unseen.
+"""Points against the beams of a laser scanner: right, in free space, or unobserved.
 
 A beam is a cone that widens with the distance. A point in a beam is right if it is near
-the scan's point; wrong if it lies in front of that, where the light has passed; behind
-it nothing is known. Rule and rounding (float32) are those of ETH3D's evaluation program
-(https://github.com/ETH3D/multi-view-evaluation, accuracy.cc).
+the scan point, wrong if it lies in front of the scan point, where the light has passed,
+and unobserved behind it. Rule and rounding (float32) are those of
+ETH3D's program (https://github.com/ETH3D/multi-view-evaluation, accuracy.cc).
 """
 
 import math
@@ -31,7 +31,7 @@ _HALF_TURN = np.float32(np.pi)
 def judge(
     points: Floats, scan: LaserScan, config: CloudConfig
 ) -> tuple[Floats, npt.NDArray[np.bool_]]:
-    """Compare points with the scan's points in whose beams they lie.
+    """Compare points with the scan points whose beams they lie in.
 
     Args:
         points: Finite coordinates in the frame of the scanner, shape (N, 3).
@@ -77,10 +77,10 @@ class _Beam:
     def spans(
         self, part: slice, cell_starts: Indices
     ) -> tuple[Indices, Indices, Indices]:
-        """Spans of the scan's points in the cells that may meet some of the points.
+        """Spans of scan points in the cells whose beams may meet some of the points.
 
         Returns:
-            Index of the point, first and one after the last of the scan's points.
+            Index of the point; index of the first scan point; one past the last.
         """
         num_rows = self.num_rows[part]
         owner = np.repeat(np.arange(len(self.num_rows))[part], num_rows)
@@ -99,7 +99,7 @@ class _Beam:
 
 
 def _angle(radius: Floats, distance: Floats) -> Floats:
-    """Angle under which a ball is seen; half a turn from inside it."""
+    """Half the angle that a ball subtends; half a turn from inside it."""
     is_outside = distance > radius
     sine = radius / np.where(is_outside, distance, np.float32(1))
     return np.where(is_outside, np.arcsin(np.minimum(sine, 1)), _HALF_TURN)
@@ -108,10 +108,11 @@ def _angle(radius: Floats, distance: Floats) -> Floats:
 def _meet(
     points: Floats, beam_radius: Floats, scan: LaserScan, target: Indices
 ) -> tuple[Indices, Floats, npt.NDArray[np.bool_]]:
-    """Of pairs of a point and a scan's point: those where the beam meets the point.
+    """Pairs of a point and a scan point whose beam meets the point.
 
     Returns:
-        Which pairs; their squared distance; whether the point is nearer to the scanner.
+        Indices of the pairs; their squared distance; whether the point is nearer to
+        the scanner than the scan point.
     """
     directions = scan.directions[target]
     along = _dot(directions, points)
@@ -130,7 +131,7 @@ def _dot(left: Floats, right: Floats) -> Floats:
 
 
 def _pairs(owners: Indices, starts: Indices, ends: Indices) -> tuple[Indices, Indices]:
-    """Spell out spans: one pair of indices for each of their elements."""
+    """Expand spans into one pair of indices per element."""
     sizes = ends - starts
     return np.repeat(owners, sizes), np.repeat(starts, sizes) + _counted_up(sizes)
 
@@ -142,7 +143,7 @@ def _counted_up(sizes: Indices) -> Indices:
 
 
 def _chunks(sizes: Indices, limit: int) -> Iterator[slice]:
-    """Cut into slices whose sizes add up to the limit at most, or of one element."""
+    """Slices whose sizes add up to at most the limit, or that have one element."""
     sums = np.cumsum(sizes)
     start, done = 0, 0
     while start < len(sizes):

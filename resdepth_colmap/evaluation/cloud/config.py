@@ -1,8 +1,9 @@
-"""The options of the cloud scores: defaults of ETH3D's evaluation program."""
+"""Options of the cloud scores; defaults of ETH3D's evaluation program."""
 
 import dataclasses
 import itertools
 import math
+from collections.abc import Sequence
 
 from resdepth_colmap.config import Config
 
@@ -11,13 +12,13 @@ DEFAULT_TOLERANCES = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5)
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class CloudConfig(Config):
-    """How a cloud is compared with laser scans; names and defaults are ETH3D's.
+    """How a cloud is scored against laser scans; names and defaults are ETH3D's.
 
     Attributes:
-        tolerances: Distances up to which a point is right, in metres, increasing.
-        voxel_size: Side of the voxels over which scores are averaged, in metres.
+        tolerances: Largest distances of a correct point, in metres, increasing.
+        voxel_size: Side of the voxels that scores are averaged over, in metres.
         beam_start_radius_meters: Radius of the laser beam at the scanner.
-        beam_divergence_halfangle_deg: Half the angle by which the beam widens.
+        beam_divergence_halfangle_deg: Half the opening angle of the beam, in degrees.
     """
 
     tolerances: tuple[float, ...] = DEFAULT_TOLERANCES
@@ -26,16 +27,12 @@ class CloudConfig(Config):
     beam_divergence_halfangle_deg: float = 0.011
 
     def __post_init__(self) -> None:
-        """Check the values once, so that no later code has to."""
-        tolerances = self.tolerances
-        positive = all(0 < tolerance < math.inf for tolerance in tolerances)
+        """Check the ranges."""
         self._check(
-            bool(tolerances) and positive,
-            "one or more distances above 0, in metres",
-            tolerances=tolerances,
+            bool(self.tolerances) and is_increasing(self.tolerances),
+            "one or more distances above 0, increasing, in metres",
+            tolerances=self.tolerances,
         )
-        increasing = all(a < b for a, b in itertools.pairwise(tolerances))
-        self._check(increasing, "increasing distances", tolerances=tolerances)
         self._check(
             0 < self.voxel_size < math.inf,
             "a length above 0",
@@ -51,3 +48,8 @@ class CloudConfig(Config):
             "an angle of 0 to 45 degrees",
             beam_divergence_halfangle_deg=self.beam_divergence_halfangle_deg,
         )
+
+
+def is_increasing(tolerances: Sequence[float]) -> bool:
+    """Whether distances are finite, above 0 and increasing."""
+    return all(a < b for a, b in itertools.pairwise((0.0, *tolerances, math.inf)))

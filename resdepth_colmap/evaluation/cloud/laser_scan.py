@@ -1,9 +1,9 @@
-"""A laser scan as its scanner sees it: points sorted by direction.
+"""A laser scan, sorted by direction from the scanner.
 
-Azimuth and inclination are cut into 2048 x 1024 cells; the points of a cell lie
-together in memory. The grid only finds points faster, and is that of ETH3D's evaluation
-program (https://github.com/ETH3D/multi-view-evaluation, accuracy.cc), with its rounding
-to float32, which is coarse about the poles.
+Azimuth and inclination are cut into 2048 x 1024 cells; the points of a cell are
+contiguous in memory. The grid only speeds up the search. It is the one of ETH3D's
+evaluation program (https://github.com/ETH3D/multi-view-evaluation, accuracy.cc), with
+its rounding to float32, which is coarse at the poles.
 """
 
 import dataclasses
@@ -12,10 +12,10 @@ import numpy as np
 import numpy.typing as npt
 
 NUM_ROWS = 1024
-"""Cells from zenith to nadir."""
+"""Number of cells from zenith to nadir."""
 
 NUM_COLUMNS = 2 * NUM_ROWS
-"""Cells of a full turn."""
+"""Number of cells of a full turn."""
 
 _ROW_RAD = np.float32(np.pi / NUM_ROWS)
 _COLUMN_RAD = np.float32(2 * np.pi / NUM_COLUMNS)
@@ -79,17 +79,14 @@ def spherical(points: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def rows_of(inclination: Floats) -> Indices:
-    """Row of the cell; beyond the poles that of the pole.
-
-    Of NaN it is the last one: there a number that is none ends in ETH3D's program.
-    """
+    """Row of the cell, clamped to the poles; NaN is the last row, as in ETH3D's."""
     cells = np.nan_to_num(np.floor(inclination / _ROW_RAD), nan=NUM_ROWS)
     rows: Indices = cells.clip(0, NUM_ROWS - 1).astype(np.int64)
     return rows
 
 
 def columns_of(azimuth: Floats) -> Indices:
-    """Column of the cell, not wrapped round to 0..NUM_COLUMNS."""
+    """Column of the cell, not wrapped to 0..NUM_COLUMNS."""
     cells = azimuth / _COLUMN_RAD
     columns: Indices = np.trunc(cells).astype(np.int64) - (cells < 0)
     return columns

@@ -1,8 +1,8 @@
 """Accuracy, completeness and F1 of a cloud against laser scans, by ETH3D's rules.
 
 T. Schöps et al., A Multi-View Stereo Benchmark with High-Resolution Images and
-Multi-Camera Videos, CVPR 2017; as their evaluation program does it, which is where the
-rules are written down: https://github.com/ETH3D/multi-view-evaluation.
+Multi-Camera Videos, CVPR 2017; the rules are those of their evaluation program,
+https://github.com/ETH3D/multi-view-evaluation.
 """
 
 import dataclasses
@@ -24,18 +24,18 @@ from resdepth_colmap.progress import Progress, SilentProgress
 logger = logging.getLogger(__name__)
 
 _POINTS_AT_ONCE = 1 << 17
-_FAR_M = 1e15  # its square is a number in float32
+_FAR_M = 1e15  # its square is finite in float32
 
 Points = npt.NDArray[np.float32]
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class PlacedScan:
-    """A laser scan, and where its scanner stood.
+    """A laser scan and the pose of its scanner.
 
     Attributes:
         points: Coordinates in the frame of the scanner, in metres, shape (N, 3).
-        world_from_scan: Rigid motion, shape (4, 4).
+        world_from_scan: Pose, shape (4, 4).
     """
 
     points: Points
@@ -44,27 +44,30 @@ class PlacedScan:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class CloudScores:
-    """Scores of a cloud; each has one value a tolerance, in 0..1.
+    """Scores of a cloud, one value per tolerance, in 0..1.
 
     Attributes:
-        tolerances: Distances, in metres.
-        accuracy: Share of the cloud's observed points that are right.
-        completeness: Share of the scans' points that the cloud reaches.
-        f1: Harmonic mean of both.
-        num_points: Points of the cloud that were compared.
-        num_scan_points: Points of all scans together.
+        tolerances: Largest distances of a correct point, increasing.
+        accuracy: Share of the observed points of the cloud that are right.
+        completeness: Share of the reference points that the cloud reaches.
+        num_points: Number of points of the cloud that were compared.
+        num_scan_points: Number of reference points.
     """
 
     tolerances: tuple[float, ...]
     accuracy: tuple[float, ...]
     completeness: tuple[float, ...]
-    f1: tuple[float, ...]
     num_points: int
     num_scan_points: int
 
+    @property
+    def f1(self) -> tuple[float, ...]:
+        """Harmonic means of accuracy and completeness."""
+        return tuple(map(f1_score, self.accuracy, self.completeness))
+
     def to_mapping(self) -> dict[str, Any]:
-        """Plain values only, ready for JSON."""
-        return dataclasses.asdict(self)
+        """Plain values, ready for JSON."""
+        return {**dataclasses.asdict(self), "f1": self.f1}
 
 
 def cloud_scores(
@@ -73,15 +76,15 @@ def cloud_scores(
     config: CloudConfig,
     progress: Progress | None = None,
 ) -> CloudScores:
-    """Compare a cloud with laser scans.
+    """Score a cloud against laser scans.
 
     Args:
         points: Coordinates of the cloud in the world of the scans, in metres, shape
-            (N, 3). Points that are not finite are left out, as in the scans. Without
-            any point all scores are 0.
+            (N, 3). Points that are not finite are left out, as in the scans. The
+            scores of a cloud without points are 0.
         scans: At least one scan with a point.
         config: Tolerances, voxels and beam.
-        progress: Is told how far the comparison is.
+        progress: Reports the progress.
 
     Raises:
         ValueError: If the scans have no point.
@@ -102,7 +105,6 @@ def cloud_scores(
         tolerances=config.tolerances,
         accuracy=accuracy,
         completeness=completeness,
-        f1=tuple(map(f1_score, accuracy, completeness)),
         num_points=len(points),
         num_scan_points=num_scan_points,
     )
@@ -146,10 +148,10 @@ def _accuracy(
 
 
 def _moved(points: Points, motion: Points) -> Points:
-    """Apply a rigid motion.
+    """Points after a rigid motion.
 
-    In float32, and summed in the order of the official program (by PCL): walls often
-    lie just on a voxel's border, where the last bit decides.
+    In float32, summed in the order of PCL, as in the official program: walls often lie
+    on the border of a voxel, where the last bit decides.
     """
     x, y, z = points.T
     rows = [r[0] * x + (r[1] * y + (r[2] * z + r[3])) for r in motion[:3]]
@@ -164,7 +166,7 @@ def _inverse(motion: Points) -> Points:
 
 
 def f1_score(accuracy: float, completeness: float) -> float:
-    """Harmonic mean of both, in 0..1; 0 if both are 0."""
+    """Harmonic mean, in 0..1; 0 if both are 0."""
     total = accuracy + completeness
     return 2 * accuracy * completeness / total if total > 0 else 0.0
 

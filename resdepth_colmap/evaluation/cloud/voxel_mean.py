@@ -1,7 +1,7 @@
-"""Shares of points, averaged over the voxels that they lie in.
+"""Shares of points, averaged over voxels.
 
-Dense and sparse places count alike. Two grids are taken, the second one shifted by half
-a voxel, and their voxels pooled: where a grid's borders lie matters less.
+Dense and sparse regions weigh alike. The voxels of two grids are pooled, the second
+shifted by half a voxel, so that the position of the borders matters less.
 Rule and rounding (float32) are those of ETH3D's evaluation program (CalcCellCoordinates
 in its util.h).
 """
@@ -14,10 +14,10 @@ _MAX_INDEX = 2**31 - 1.0
 
 
 class VoxelGrids:
-    """The voxels of a cloud, in both grids."""
+    """Both voxel grids of a cloud."""
 
     def __init__(self, points: npt.NDArray[np.float32], voxel_size: float) -> None:
-        """Find the voxel of each point.
+        """Assign each point to its voxels.
 
         Args:
             points: Finite coordinates in the world, shape (N, 3).
@@ -28,11 +28,11 @@ class VoxelGrids:
     def mean_share(
         self, good: npt.NDArray[np.bool_], counted: npt.NDArray[np.bool_]
     ) -> float:
-        """Average the share of good points over the voxels with a counted point.
+        """Mean share of good points of the voxels with a counted point.
 
         Args:
             good: Which points are good, shape (N,); each is counted too.
-            counted: Which points count at all, shape (N,).
+            counted: Which points count, shape (N,).
 
         Returns:
             A share in 0..1; 0 without a counted point.
@@ -50,7 +50,7 @@ class VoxelGrids:
 def _voxel_ids(
     points: npt.NDArray[np.float32], voxel_size: float, shift: float
 ) -> npt.NDArray[np.int32]:
-    """Number the occupied voxels, and give each point the number of its voxel."""
+    """Index of the voxel of each point, among the occupied ones."""
     per_voxel = np.float32(1 / np.float64(np.float32(voxel_size)))
     with np.errstate(over="ignore"):
         cells = np.floor(points * per_voxel + np.float32(shift))

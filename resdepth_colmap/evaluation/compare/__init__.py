@@ -1,1 +1,1 @@
-"""`compare`: filtered, unfiltered and refined maps of a workspace."""
+"""The command `compare`: filtered, unfiltered and refined maps of a workspace."""

@@ -1,49 +1,47 @@
-"""The maps of an arm, fused: by us and by COLMAP, with the same thresholds."""
+"""The maps of each method, fused by open3d and by COLMAP with the same thresholds."""
 
 import dataclasses
+import functools
 import tempfile
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from resdepth_colmap.config import FuseConfig, Fuser
 from resdepth_colmap.errors import FusionError
 from resdepth_colmap.evaluation.compare.method_maps import confident_depth
 from resdepth_colmap.evaluation.compare.methods import Method
-from resdepth_colmap.geometry.normals import normals_from_depth
-from resdepth_colmap.geometry.pixels import index_K
-from resdepth_colmap.io.colmap.depth_map import write_depth_map
-from resdepth_colmap.io.colmap.normal_map import write_normal_map
 from resdepth_colmap.io.colmap.output import OutputWorkspace
 from resdepth_colmap.io.colmap.workspace import Workspace
 from resdepth_colmap.io.files import link_or_copy
 from resdepth_colmap.io.point_cloud import PointCloud
 from resdepth_colmap.pipeline.fuse.colmap import fuse_with_colmap
-from resdepth_colmap.pipeline.fuse.geometric_consistency import FuseStatistics
+from resdepth_colmap.pipeline.fuse.geometric_consistency import (
+    Consistent,
+    FuseStatistics,
+)
 from resdepth_colmap.pipeline.fuse.stage import fuse_maps
 from resdepth_colmap.pipeline.fuse.views import MapFiles
 from resdepth_colmap.progress import Progress
 from resdepth_colmap.scene import Scene
 
-NO_POINTS = "no point survived the fusion: all scores are 0"
+NO_POINTS = "no point survived the fusion, so all scores are 0"
 NO_TRACKS = (
-    "COLMAP's fusion finds neighbouring images by the sparse points they share, and "
-    "the model has none: it would give no point, so it is left out"
+    "COLMAP's fusion finds neighbouring images by shared sparse points, and the model "
+    "has none: it would give no point, so it is left out"
 )
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class MethodCloud:
-    """The cloud of an arm.
+    """The cloud of a method.
 
     Attributes:
-        cloud: The points, which may be none; None if it could not be fused at all.
-        statistics: What became of the pixels; None without a cloud.
+        cloud: The points, maybe none; None if the fusion failed or was left out.
+        statistics: Counts of fused and rejected pixels; None without a cloud.
         seconds: Wall time of the fusion.
-        note: What there is to say: no points, or why there is no cloud.
+        note: Why there is no point or no cloud; else "".
     """
 
     cloud: PointCloud | None
@@ -71,42 +69,38 @@ def fuse_methods(
     config: FuseConfig,
     progress: Progress,
 ) -> dict[str, dict[str, MethodCloud]]:
-    """Fuse every arm twice; nothing is written into the workspace.
+    """Fuse the maps of every method twice; the workspace stays as it is.
 
-    Each arm becomes a temporary workspace of links. Where a view has no normal map,
-    normals are computed from its depth, as those of refined maps are.
+    Normals of views without a normal map are computed from the depth.
 
     Args:
-        workspace: The user's.
+        workspace: Has images and model.
         scene: Its views.
         methods: What to fuse.
         config: Thresholds of both.
-        progress: Who listens.
+        progress: Reports the progress.
 
     Returns:
-        The clouds by the name of the fuser, then of the arm.
+        The clouds by fuser, then by method.
 
     Raises:
-        WorkspaceError: If a map cannot be read, or the temporary folder not be written.
+        WorkspaceError: If a map cannot be read, or a temporary file cannot be written.
     """
     clouds: dict[str, dict[str, MethodCloud]] = {str(fuser): {} for fuser in Fuser}
     for method in methods:
-        with tempfile.TemporaryDirectory(prefix="resdepth-compare-") as folder:
-            copy = _linked(workspace, method, config.min_confidence, Path(folder))
-            files = [_file_in(copy, file) for file in method.files]
-            for fuser in Fuser:
-                clouds[str(fuser)][method.name] = _fused(
-                    copy,
-                    scene,
-                    files,
-                    dataclasses.replace(config, fuser=fuser),
-                    progress,
-                )
+        fuse = functools.partial(fuse_maps, method.files, scene, config, progress)
+        clouds[str(Fuser.OPEN3D)][method.name] = _timed(fuse)
+        fuse = functools.partial(_fuse_by_colmap, workspace, scene, method, config)
+        clouds[str(Fuser.COLMAP)][method.name] = (
+            MethodCloud(cloud=None, note=NO_TRACKS)
+            if scene.num_shared_points is None
+            else _timed(fuse)
+        )
     return clouds
 
 
 def fusion_settings(config: FuseConfig, num_views: int) -> Mapping[str, dict[str, Any]]:
-    """What each fuser is told, by its name, in its own words; the same for all arms."""
+    """The options of each fuser, under its own names; the same for all methods."""
     needed = min(config.min_num_views, num_views)
     shared = {
         "max_depth_error": config.max_depth_error,
@@ -129,23 +123,12 @@ def fusion_settings(config: FuseConfig, num_views: int) -> Mapping[str, dict[str
     }
 
 
-def _fused(
-    copy: OutputWorkspace,
-    scene: Scene,
-    files: Sequence[MapFiles],
-    config: FuseConfig,
-    progress: Progress,
-) -> MethodCloud:
+def _timed(fuse: Callable[[], Consistent]) -> MethodCloud:
     start = time.perf_counter()
-    if config.fuser is Fuser.OPEN3D:
-        found = fuse_maps(files, scene, config, progress)
-    elif scene.num_shared_points is None:
-        return MethodCloud(cloud=None, note=NO_TRACKS)
-    else:
-        try:
-            found = fuse_with_colmap(copy.workspace, scene, files, config)
-        except FusionError as error:
-            return MethodCloud(cloud=None, note=" ".join(str(error).split()))
+    try:
+        found = fuse()
+    except FusionError as error:
+        return MethodCloud(cloud=None, note=" ".join(str(error).split()))
     return MethodCloud(
         cloud=found.cloud,
         statistics=found.statistics,
@@ -154,42 +137,27 @@ def _fused(
     )
 
 
-def _linked(
-    workspace: Workspace, method: Method, min_confidence: float, folder: Path
-) -> OutputWorkspace:
-    """A workspace with the arm's maps, named as COLMAP's fusion wants them."""
-    copy = OutputWorkspace(source=dataclasses.replace(workspace, path=folder))
+def _fuse_by_colmap(
+    workspace: Workspace, scene: Scene, method: Method, config: FuseConfig
+) -> Consistent:
+    """Fuse in a temporary workspace of links, under the names that COLMAP fuses."""
     names = [file.view.name for file in method.files]
-    copy.prepare(names)
-    copy.write_cfgs(names)
-    for file in method.files:
-        _place_maps(copy, file, min_confidence)
-    return copy
+    with tempfile.TemporaryDirectory(prefix="resdepth-compare-") as folder:
+        copy = OutputWorkspace(source=dataclasses.replace(workspace, path=Path(folder)))
+        copy.prepare(names)
+        copy.write_cfgs(names)
+        files = [_linked(file, copy, config.min_confidence) for file in method.files]
+        return fuse_with_colmap(copy.workspace, scene, files, config)
 
 
-def _place_maps(copy: OutputWorkspace, file: MapFiles, min_confidence: float) -> None:
+def _linked(file: MapFiles, copy: OutputWorkspace, min_confidence: float) -> MapFiles:
     name = file.view.name
     depth_path, normal_path = copy.depth_map_path(name), copy.normal_map_path(name)
-    has_normals = file.normal_path is not None and file.normal_path.is_file()
-    if min_confidence > 0 or not has_normals:
-        depth = confident_depth(file, min_confidence)
-    if min_confidence > 0:
-        write_depth_map(depth_path, depth)
-    else:
+    normals = file.normal_path
+    if min_confidence == 0 and normals is not None and normals.is_file():
         link_or_copy(file.depth_path, depth_path)
-    if has_normals and file.normal_path is not None:
-        link_or_copy(file.normal_path, normal_path)
+        link_or_copy(normals, normal_path)
     else:
-        height_px, width_px = depth.shape
-        K = index_K(file.view.camera.resized(width_px, height_px))
-        write_normal_map(normal_path, np.asarray(normals_from_depth(depth, K)))
-
-
-def _file_in(copy: OutputWorkspace, file: MapFiles) -> MapFiles:
-    name = file.view.name
-    return MapFiles(
-        view=file.view,
-        image_path=file.image_path,
-        depth_path=copy.depth_map_path(name),
-        normal_path=copy.normal_map_path(name),
-    )
+        depth = confident_depth(file, min_confidence)
+        copy.write_maps(name, depth, file.read().normals)
+    return dataclasses.replace(file, depth_path=depth_path, normal_path=normal_path)

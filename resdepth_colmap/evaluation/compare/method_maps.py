@@ -1,55 +1,27 @@
-"""The depth maps of all arms of a view, at one size, read when they are asked for."""
+"""The depth maps of all methods of the compared views, read on demand."""
 
-import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from resdepth_colmap.evaluation.compare.methods import Method
+from resdepth_colmap.evaluation.metrics.view_maps import ViewMaps
 from resdepth_colmap.geometry.pixels import index_K
 from resdepth_colmap.geometry.resize import nearest_resized
 from resdepth_colmap.io.colmap.depth_map import read_depth_map
 from resdepth_colmap.pipeline.fuse.views import MapFiles
 from resdepth_colmap.pipeline.view_images import ArrayCache
-from resdepth_colmap.scene import DepthMap, Matrix, View
+from resdepth_colmap.scene import DepthMap
 
 MAX_NUM_BYTES = 512 << 20
-"""Of maps that are kept, because several views are compared with them."""
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
-class ViewMaps:
-    """The depth of one view in every arm.
-
-    Attributes:
-        view: The view.
-        K: K for index coordinates at the size of the maps, shape (3, 3).
-        depths: By the name of the arm, each of shape (H, W), in units; 0 = no depth.
-    """
-
-    view: View
-    K: Matrix
-    depths: Mapping[str, DepthMap]
-
-    @property
-    def shape(self) -> tuple[int, int]:
-        """Height and width of the maps, in pixels."""
-        height_px, width_px = next(iter(self.depths.values())).shape
-        return height_px, width_px
-
-    @property
-    def common(self) -> npt.NDArray[np.bool_]:
-        """Where every arm has a depth, shape (H, W)."""
-        covered = [depth > 0 for depth in self.depths.values()]
-        return np.asarray(np.logical_and.reduce(covered))
+"""Size of the cache of maps; each is compared with those of several views."""
 
 
 class MethodMaps(Sequence[ViewMaps]):
-    """The compared views; the latest of their maps stay in memory."""
+    """The maps of the compared views; the latest stay in memory."""
 
     def __init__(self, methods: Sequence[Method], min_confidence: float = 0.0) -> None:
-        """Read nothing yet; depth of less than that confidence counts as none."""
+        """Read nothing yet; depth below that confidence counts as none."""
         self._methods = methods
         self._min_confidence = min_confidence
         self._cache = ArrayCache(MAX_NUM_BYTES)
@@ -59,7 +31,7 @@ class MethodMaps(Sequence[ViewMaps]):
         return len(self._methods[0].files)
 
     def __getitem__(self, index: int) -> ViewMaps:  # type: ignore[override] # no slices
-        """The maps of a view, a smaller one at the size of the largest.
+        """The maps of a view, resized to the largest of them.
 
         Raises:
             WorkspaceError: If a map cannot be read.
@@ -67,14 +39,12 @@ class MethodMaps(Sequence[ViewMaps]):
         files = {method.name: method.files[index] for method in self._methods}
         depths = {name: self._depth(name, file) for name, file in files.items()}
         height_px, width_px = max(depth.shape for depth in depths.values())
-        size = (width_px, height_px)
+        size_px = (width_px, height_px)
         view = self._methods[0].files[index].view
         return ViewMaps(
             view=view,
             K=index_K(view.camera.resized(width_px, height_px)),
-            depths={
-                name: nearest_resized(depth, size) for name, depth in depths.items()
-            },
+            depths={name: nearest_resized(it, size_px) for name, it in depths.items()},
         )
 
     def _depth(self, method: str, file: MapFiles) -> DepthMap:
@@ -85,11 +55,11 @@ class MethodMaps(Sequence[ViewMaps]):
 
 
 def confident_depth(file: MapFiles, min_confidence: float) -> DepthMap:
-    """The depth map of a view without what it is not confident of.
+    """The depth map of a view without depth of low confidence.
 
     Args:
         file: The maps; without a confidence map, all depth is kept.
-        min_confidence: Depth of less is none.
+        min_confidence: Depth of a lower confidence becomes 0.
 
     Raises:
         WorkspaceError: If a map cannot be read.

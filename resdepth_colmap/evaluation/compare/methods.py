@@ -1,4 +1,4 @@
-"""The arms of a comparison: which maps of a workspace are filtered, and which not."""
+"""The compared methods: which maps of a workspace are filtered, and which are not."""
 
 import dataclasses
 import shlex
@@ -19,22 +19,22 @@ from resdepth_colmap.scene import Scene, View
 METHODS = ("filtered", "unfiltered", "refined")
 REFINED = "refined"
 
-_PREFERRED = "geometric"  # what COLMAP calls its last maps
+_PREFERRED = "geometric"  # the last pass of COLMAP
 _WITHOUT = {
-    "filtered": "no {kinds} map with holes: left out; `resdepth-colmap stereo` and "
-    "COLMAP's patch_match_stereo write filtered geometric maps",
-    "unfiltered": "no {kinds} map without holes: left out; `resdepth-colmap stereo` "
-    "and COLMAP's patch_match_stereo leave unfiltered photometric maps",
+    "filtered": "no depth map with holes, so not compared; `resdepth-colmap stereo` "
+    "and COLMAP's patch_match_stereo write filtered geometric maps.",
+    "unfiltered": "no depth map without holes, so not compared; `resdepth-colmap "
+    "stereo` and COLMAP's patch_match_stereo write unfiltered photometric maps.",
 }
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class Method:
-    """The maps of one arm.
+    """The maps of one method.
 
     Attributes:
-        name: One of `ARMS`.
-        kind: The word before ".bin" in the names of its files, or "refined".
+        name: One of `METHODS`.
+        kind: The kind of map, as in the names of its files, or "refined".
         files: The maps of each compared view, in the order of the scene.
     """
 
@@ -44,21 +44,26 @@ class Method:
 
     @property
     def own_normals(self) -> bool:
-        """Whether each view has a normal map; else they are computed from the depth."""
+        """Whether every view has a normal map; else they come from the depth."""
         return all(
             file.normal_path is not None and file.normal_path.is_file()
             for file in self.files
         )
 
+    def to_mapping(self) -> dict[str, str]:
+        """Kind and normals, ready for JSON."""
+        normals = "own" if self.own_normals else "computed from the depth"
+        return {"kind": self.kind, "normals": normals}
+
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class FoundMethods:
-    """The arms that a workspace has.
+    """The methods that a workspace has maps of.
 
     Attributes:
-        methods: The refined maps, and filtered ones or unfiltered ones or both, of the
+        methods: The refined maps, and the filtered or unfiltered ones or both, of the
             same views.
-        notes: What there is to say about what is missing.
+        notes: What is missing.
     """
 
     methods: tuple[Method, ...]
@@ -66,23 +71,23 @@ class FoundMethods:
 
     @property
     def views(self) -> tuple[View, ...]:
-        """The views that are compared: all arms have a map of each."""
+        """The compared views: every method has a map of each."""
         return tuple(file.view for file in self.methods[0].files)
 
 
 def find_methods(
     output: OutputWorkspace, scene: Scene, config: CompareConfig
 ) -> FoundMethods:
-    """Find the arms of a workspace; the maps themselves are only looked through.
+    """Find the methods of a workspace by the share of pixels that its maps fill.
 
     Args:
         output: Where the refined maps of the workspace are.
         scene: Its views.
-        config: May name the kinds.
+        config: May name the kinds of map.
 
     Raises:
-        WorkspaceError: If there are no refined maps, no others, no view that has both,
-            or a map is broken.
+        WorkspaceError: If there are no refined maps, no initial ones, no view that has
+            both, or a map is broken.
     """
     workspace = output.source
     refined = [view for view in scene.views if output.is_written(view.name)]
@@ -107,15 +112,11 @@ def find_methods(
             "refined one; refine more images, or choose with --filtered and "
             "--unfiltered."
         )
-    notes = [
-        f"{name} arm: {_WITHOUT[name].format(kinds='depth')}."
-        for name in METHODS
-        if name != REFINED and name not in chosen
-    ]
+    notes = [f"{name}: {text}" for name, text in _WITHOUT.items() if name not in chosen]
     if len(compared) < len(scene.views):
         notes.append(
-            f"{len(compared)} of {len(scene.views)} views are compared: only they have "
-            "a map in every arm."
+            f"{len(compared)} of {len(scene.views)} views are compared: the others "
+            "lack a map of some method."
         )
     return FoundMethods(
         methods=tuple(
@@ -130,7 +131,7 @@ def find_methods(
 def _filled_shares(
     workspace: Workspace, views: Sequence[View], kinds: Mapping[str, Sequence[str]]
 ) -> dict[str, float]:
-    """Of each kind the mean share of pixels with a depth."""
+    """Mean share of pixels with a depth, by kind."""
     shares: dict[str, list[float]] = {}
     for view in views:
         for kind in kinds[view.name]:
@@ -145,7 +146,7 @@ def _filled_shares(
 def _chosen_kinds(
     workspace: Workspace, shares: Mapping[str, float], config: CompareConfig
 ) -> dict[str, str]:
-    """The kind of the filtered arm and that of the unfiltered one, if there is any."""
+    """The kinds of the filtered and the unfiltered maps, where there are any."""
     chosen = {"filtered": config.filtered, "unfiltered": config.unfiltered}
     for name, kind in chosen.items():
         if kind and kind not in shares:

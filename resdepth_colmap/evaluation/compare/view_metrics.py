@@ -1,12 +1,12 @@
-"""All measures of all compared views of a workspace."""
+"""The measures of the compared views of a workspace."""
 
 import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
 
-from resdepth_colmap.evaluation.cloud.reference_cloud import DepthTruth
-from resdepth_colmap.evaluation.compare.method_maps import MethodMaps, ViewMaps
+from resdepth_colmap.evaluation.cloud.reference_cloud import ReferenceCloud
+from resdepth_colmap.evaluation.compare.method_maps import MethodMaps
 from resdepth_colmap.evaluation.compare.methods import REFINED
 from resdepth_colmap.evaluation.metrics.reference_free import (
     Sums,
@@ -16,7 +16,8 @@ from resdepth_colmap.evaluation.metrics.reference_free import (
     merged,
     sparse_points,
 )
-from resdepth_colmap.evaluation.metrics.rewarped_photos import photo_agreement
+from resdepth_colmap.evaluation.metrics.rewarped_photos import photo_correlation
+from resdepth_colmap.evaluation.metrics.view_maps import ViewMaps
 from resdepth_colmap.geometry.resize import nearest_resized
 from resdepth_colmap.geometry.view_selection import choose_sources
 from resdepth_colmap.io.colmap.sparse_points import SparsePoints
@@ -26,20 +27,20 @@ from resdepth_colmap.progress import Progress
 from resdepth_colmap.scene import DepthMap, Scene
 
 NUM_NEIGHBOURS = 4
-"""A view's map is compared with so many of the compared views', the best ones."""
+"""Number of neighbours that a map is compared with; the best of its sources."""
 
 NUM_PHOTOS = 2
-"""And its photo with so many."""
+"""Number of neighbours that an image is compared with."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class MeasuredView:
-    """What was measured on one view.
+    """The measures of one view.
 
     Attributes:
         name: Image name.
-        sums: By arm, then by measure.
-        depth_ratio: Median of refined over true depth; None without truth.
+        sums: By method, then by measure.
+        depth_ratio: Median of refined over true depth; None without ground truth.
     """
 
     name: str
@@ -48,78 +49,76 @@ class MeasuredView:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
-class Witnesses:
-    """What the measures are taken from.
+class MetricInputs:
+    """What the maps are compared with.
 
     Attributes:
         scene: All views of the workspace.
-        images: Loads the photos.
-        points: The sparse points; there may be none.
-        truth: True depth maps; None if there are none.
+        images: Loads the images.
+        points: The sparse points, maybe none.
+        reference: Ground truth; None without.
     """
 
     scene: Scene
     images: ViewImages
     points: SparsePoints
-    truth: DepthTruth | None = None
+    reference: ReferenceCloud | None = None
 
     def true_depth(self, maps: ViewMaps) -> DepthMap | None:
-        """The true depth of a view at the size of its maps; None if not known."""
-        if self.truth is None:
-            return None
-        for true_map in self.truth.maps:
-            if true_map.view.name == maps.view.name:
-                return nearest_resized(true_map.depth, maps.shape[::-1])
+        """The true depth of a view at the size of its maps; None if unknown."""
+        for truth in () if self.reference is None else self.reference.maps:
+            if truth.view.name == maps.view.name:
+                return nearest_resized(truth.depth, maps.shape[::-1])
         return None
 
 
 def measure_views(
-    maps: MethodMaps, witnesses: Witnesses, progress: Progress
+    maps: MethodMaps, inputs: MetricInputs, progress: Progress
 ) -> list[MeasuredView]:
-    """Measure view by view.
+    """Measure each view.
 
     Args:
         maps: The compared views; at least one.
-        witnesses: What they are measured with.
-        progress: Who listens.
+        inputs: What they are compared with.
+        progress: Reports the progress.
 
     Raises:
-        WorkspaceError: If a map or photo cannot be read.
+        WorkspaceError: If a map or image cannot be read.
     """
-    scene = witnesses.scene
+    scene = inputs.scene
     compared = [scene.index(maps[index].view.name) for index in range(len(maps))]
     measured = []
     with progress.stage("Measuring", len(maps)) as advance:
-        for place, index in enumerate(compared):
-            choices = choose_sources(scene, index, NUM_NEIGHBOURS, compared)
-            chosen = [compared.index(choice.index) for choice in choices]
-            measured.append(_measured(maps, place, chosen, witnesses))
+        for index, view_index in enumerate(compared):
+            choices = choose_sources(scene, view_index, NUM_NEIGHBOURS, compared)
+            neighbours = [compared.index(choice.index) for choice in choices]
+            measured.append(_measured(maps, index, neighbours, inputs))
             advance(1)
     return measured
 
 
 def _measured(
-    all_maps: MethodMaps, place: int, neighbours: Sequence[int], witnesses: Witnesses
+    all_maps: MethodMaps, index: int, neighbours: Sequence[int], inputs: MetricInputs
 ) -> MeasuredView:
-    maps = all_maps[place]
-    scene = witnesses.scene
-    parts = [coverage(maps), sparse_points(maps, witnesses.points)]
+    maps = all_maps[index]
+    scene = inputs.scene
+    parts = [coverage(maps), sparse_points(maps, inputs.points)]
     ratio = None
-    truth = witnesses.true_depth(maps)
+    truth = inputs.true_depth(maps)
     if truth is not None:
         parts.append(against_truth(maps, truth))
         ratio = _ratio(maps.depths[REFINED], truth)
     if neighbours:
         others = [all_maps[it] for it in neighbours]
         parts.append(agreement(maps, others))
-        photos = view_inputs(
+        images = view_inputs(
             scene,
             scene.index(maps.view.name),
             [scene.index(other.view.name) for other in others[:NUM_PHOTOS]],
             maps.depths[REFINED],
-            witnesses.images,
+            inputs.images,
         )
-        parts.append(photo_agreement(maps, photos))
+        parts.append(photo_correlation(maps, images))
     return MeasuredView(name=maps.view.name, sums=merged(parts), depth_ratio=ratio)
 
 

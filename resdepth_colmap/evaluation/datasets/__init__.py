@@ -1,1 +1,1 @@
-"""Samples with known depth: Middlebury, ETH3D, workspaces with `ground_truth/`."""
+"""Samples with ground truth: Middlebury, ETH3D, workspaces with `ground_truth/`."""

@@ -1,7 +1,7 @@
-"""Stereo pairs of ETH3D as cases to compare, by the paper's protocol.
+"""Stereo pairs of ETH3D as samples, by the protocol of the paper.
 
-The undistorted images are made 886 pixels wide and grey; depth is matched in the first
-image of a pair, against the second alone.
+The undistorted images are resized to a width of 886 pixels; the first image of a pair
+is matched against the second one alone.
 """
 
 import dataclasses
@@ -46,13 +46,13 @@ from resdepth_colmap.scene import Camera, Scene, UnitColors, View
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Eth3dOptions:
-    """What is compared.
+    """Which samples of ETH3D to read.
 
     Attributes:
-        scenes: Names of the scenes; () = all that are there.
-        pairs_path: File of the pairs; None = `pairs.txt` in the root, if there is one.
-        num_pairs: Pairs of a scene that the file does not name; None = as many as the
-            paper has of the scene, else 4.
+        scenes: Names of the scenes; () = all in the root.
+        pairs_path: File of the pairs; None = `pairs.txt` in the root, if present.
+        num_pairs: Number of pairs of a scene that the file does not list; None = as in
+            the paper, or 4 for other scenes.
         image_width_px: Longest side of the images; they are never enlarged.
     """
 
@@ -62,13 +62,13 @@ class Eth3dOptions:
     image_width_px: int = PAPER_IMAGE_WIDTH_PX
 
     def pairs_file(self, root: Path) -> Path | None:
-        """The file that names pairs, None if there is none."""
+        """The file that lists the pairs; None if there is none."""
         if self.pairs_path is not None:
             return self.pairs_path
         return root / PAIRS_NAME if (root / PAIRS_NAME).is_file() else None
 
     def protocol(self, root: Path) -> dict[str, Any]:
-        """What a result has to say of itself, ready for JSON."""
+        """The protocol, for the result, ready for JSON."""
         path = self.pairs_file(root)
         return {
             "image_width_px": self.image_width_px,
@@ -77,14 +77,14 @@ class Eth3dOptions:
 
 
 def eth3d_sources(root: Path, options: Eth3dOptions) -> tuple[SceneSource, ...]:
-    """The scenes to compare; a name that is not there is a scene that fails.
+    """The scenes to read; reading a scene that is not in the root fails.
 
     Args:
-        root: The folder that ETH3D's archives were unpacked into.
-        options: What is compared.
+        root: The folder with the unpacked archives of ETH3D.
+        options: Scenes, pairs and size.
 
     Raises:
-        WorkspaceError: If there is no scene at all, or the file of pairs is malformed.
+        WorkspaceError: If there is no scene, or the file of pairs is malformed.
     """
     scenes = {scene.name: scene for scene in find_eth3d_scenes(root)}
     path = options.pairs_file(root)
@@ -93,7 +93,7 @@ def eth3d_sources(root: Path, options: Eth3dOptions) -> tuple[SceneSource, ...]:
     def read(name: str, wanted: SampleOptions) -> list[LazySample]:
         if name not in scenes:
             raise WorkspaceError(
-                f"{root}: no scene {name} in it; there are: {', '.join(scenes)}; "
+                f"{root}: no scene {name}; there are: {', '.join(scenes)}; "
                 f"download {name} from {DOWNLOADS}."
             )
         reader = _SceneReader(scenes[name], options.image_width_px)
@@ -110,7 +110,7 @@ def eth3d_sources(root: Path, options: Eth3dOptions) -> tuple[SceneSource, ...]:
 
 
 class _SceneReader:
-    """A scene whose models were read."""
+    """A scene with its models."""
 
     def __init__(self, files: Eth3dScene, image_width_px: int) -> None:
         files.check_parts()
@@ -125,7 +125,7 @@ class _SceneReader:
         }
 
     def pairs_by_rule(self, num_pairs: int | None) -> tuple[Pair, ...]:
-        """Pairs whose reference has a true depth.
+        """Pairs whose reference has ground truth.
 
         Raises:
             WorkspaceError: If there are none.
@@ -141,13 +141,13 @@ class _SceneReader:
         if not pairs:
             raise WorkspaceError(
                 f"{self.files.path}: no pair of high overlap among the "
-                f"{len(references)} of {len(self.indices)} images with a true depth; "
-                f"name pairs in {PAIRS_NAME}."
+                f"{len(references)} of {len(self.indices)} images with ground truth; "
+                f"list pairs in {PAIRS_NAME}."
             )
         return pairs
 
     def sample(self, pair: Pair, wanted: SampleOptions) -> DepthSample:
-        """Read the images and the truth of a pair."""
+        """Read the images and the ground truth of a pair."""
         reference, source = (self.scene.views[index] for index in pair)
         camera = self._camera(reference)
         near, far = wanted.stereo.depth_min, wanted.stereo.depth_max
@@ -158,8 +158,8 @@ class _SceneReader:
         )
         if not truth.any():
             raise WorkspaceError(
-                f"{self.files.truth_path(_file_name(reference))}: no depth in it falls "
-                f"into the undistorted image; {DISTORTED} is of other images."
+                f"{self.files.truth_path(_file_name(reference))}: none of its depths "
+                f"projects into the undistorted image; {DISTORTED} is of other images."
             )
         return DepthSample(
             name=f"{_file_name(reference)} {_file_name(source)}",

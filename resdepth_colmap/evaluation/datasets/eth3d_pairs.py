@@ -1,7 +1,7 @@
-"""Which stereo pairs of an ETH3D scene are compared.
+"""The choice of stereo pairs of an ETH3D scene.
 
-The paper picked its pairs by hand, "with high overlap and reasonable baselines", and
-did not publish them; here a rule does it, and a file `pairs.txt` may say otherwise.
+The pairs of the paper were picked by hand, "with high overlap and reasonable
+baselines", and are not published; here a rule or a file `pairs.txt` picks them.
 """
 
 from collections.abc import Collection, Mapping
@@ -21,20 +21,20 @@ from resdepth_colmap.scene import Scene
 
 PAIRS_NAME = "pairs.txt"
 NUM_PAIRS = 4
-"""Pairs of a scene of which the paper does not say how many it has."""
+"""Default number of pairs of a scene that is not in the paper."""
 
-_NUM_CANDIDATES = 10  # sources of a reference that are looked at
+_NUM_CANDIDATES = 10  # sources of a reference
 
 LEAST_OVERLAP = 0.6
-"""Share of the reference that the source sees, at the middle of its depths."""
+"""Least share of the reference that the source sees, at the middle of its depths."""
 
 
 class Pair(NamedTuple):
     """A stereo pair.
 
     Attributes:
-        reference: Position in `Scene.views` of the view whose depth is compared.
-        source: Position of the second view.
+        reference: Index of the reference view in `Scene.views`.
+        source: Index of the source view.
     """
 
     reference: int
@@ -44,20 +44,19 @@ class Pair(NamedTuple):
 def choose_pairs(
     scene: Scene, references: Collection[int], num_pairs: int
 ) -> tuple[Pair, ...]:
-    """The pairs with the most shared points, at a reasonable angle, no view twice.
+    """The pairs with the most shared points, at a moderate angle, preferably disjoint.
 
     Each reference is paired with the best of its sources (`choose_sources`) that see
-    60 % of it and whose rays meet its own at 2 to 15 degrees. The pairs with the most
-    shared points are taken; where no view is left that is in none yet, a view may be
-    in two.
+    60 % of it at a triangulation angle of 2 to 15 degrees. The pairs with the most
+    shared points are taken, those with a view of an earlier pair last.
 
     Args:
         scene: The views and their statistics.
-        references: Positions of the views whose depth is known.
-        num_pairs: How many to take at most.
+        references: Indices of the views with ground truth.
+        num_pairs: Largest number of pairs.
 
     Returns:
-        The pairs, by their references; fewer than asked for if fewer count.
+        The pairs, sorted by reference; fewer if fewer qualify.
     """
     found = []
     for reference in sorted(references):
@@ -75,13 +74,13 @@ def choose_pairs(
 
 
 def read_pairs(path: Path) -> dict[str, list[tuple[str, str]]]:
-    """Read a `pairs.txt`: scene, reference and source on a line, "#" for comments.
+    """Read a `pairs.txt`: scene, reference and source per line, "#" for comments.
 
     Returns:
         File names of reference and source, by the name of the scene.
 
     Raises:
-        WorkspaceError: If it cannot be read, or a line has not three words.
+        WorkspaceError: If it cannot be read, or a line does not have three words.
     """
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
@@ -105,15 +104,15 @@ def read_pairs(path: Path) -> dict[str, list[tuple[str, str]]]:
 def named_pairs(
     path: Path, names: list[tuple[str, str]], indices: Mapping[str, int]
 ) -> tuple[Pair, ...]:
-    """The pairs that a `pairs.txt` names.
+    """The pairs that a `pairs.txt` lists.
 
     Args:
         path: That file, for messages.
         names: File names of reference and source.
-        indices: Position of each view by the file name of its image.
+        indices: Index of each view by the file name of its image.
 
     Raises:
-        WorkspaceError: If the model has no image of a name, or a pair is one image.
+        WorkspaceError: If the model lacks an image, or a pair is of one image.
     """
     for pair in names:
         for name in pair:
@@ -128,7 +127,7 @@ def named_pairs(
 
 def _is_good(scene: Scene, reference: int, choice: SourceChoice) -> bool:
     if scene.depth_range is None or scene.depth_range[reference, 1] <= 0:
-        return True  # choose_sources went by the poses alone, and so do we
+        return True  # without sparse points, choose_sources uses the poses alone
     low, high = GOOD_ANGLES_DEG
     middle = float(np.sqrt(np.prod(scene.depth_range[reference])))
     seen = overlap(scene.views[reference], scene.views[choice.index], [middle])

@@ -1,8 +1,8 @@
-"""ETH3D's true depth, brought to the undistorted camera.
+"""ETH3D's ground-truth depth in the undistorted camera.
 
-The depth is given for the pixels of the distorted image. Each is lifted by the
-distorted camera and falls into a pixel of the undistorted one; a bilinear remapping
-would mix surfaces with each other, and with "not known".
+ETH3D stores the depth of the distorted image. Its pixels are back-projected with the
+distorted camera and projected into the undistorted one with a z-buffer; a bilinear
+remapping would mix surfaces with each other, and with unknown depth.
 """
 
 from collections.abc import Iterator
@@ -20,26 +20,26 @@ from resdepth_colmap.scene import Camera, DepthMap, Matrix, View, cam_from_cam
 
 _PIXELS_AT_ONCE = 1 << 21
 _LARGEST_ANGLE_DEG = 0.5
-_LARGEST_SHIFT = 0.01  # metres: both models are of one camera, so there is none
+_LARGEST_SHIFT = 0.01  # metres; both models have the same camera centres
 
 
 def undistorted_truth(
     scene: Eth3dScene, distorted: DistortedView, view: View, camera: Camera
 ) -> DepthMap:
-    """The true depth of an undistorted image.
+    """The ground-truth depth of an undistorted image.
 
     Args:
-        scene: Where the files lie.
-        distorted: The image as it was taken.
+        scene: The files.
+        distorted: The distorted image.
         view: The undistorted image.
         camera: Its camera at the size of the map.
 
     Returns:
-        Shape (H, W), float32, in metres; 0 = not known, or not to be compared.
+        Shape (H, W), float32, in metres; 0 = unknown or masked.
 
     Raises:
-        WorkspaceError: If a file is missing, broken or of another size, or the two
-            calibrations are not of one image.
+        WorkspaceError: If a file is missing, broken or of another size, or the poses of
+            the two models differ.
     """
     _check_poses(scene, distorted, view)
     file_name = distorted.name.rpartition("/")[2]
@@ -55,7 +55,7 @@ def undistorted_truth(
 def _points(
     depth: DepthMap, distorted: DistortedView, view_from_distorted: Matrix
 ) -> Iterator[Matrix]:
-    """The known points in the undistorted camera's frame, some at a time."""
+    """The known points in the frame of the undistorted camera, in chunks."""
     pixels: npt.NDArray[np.int64] = np.flatnonzero(depth)
     for start in range(0, pixels.size, _PIXELS_AT_ONCE):
         chosen = pixels[start : start + _PIXELS_AT_ONCE]

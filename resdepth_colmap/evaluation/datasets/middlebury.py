@@ -1,4 +1,4 @@
-"""Middlebury's stereo scenes as they are distributed: calib.txt, two images, disparity.
+"""Middlebury's stereo scenes as distributed: calib.txt, two images, disparity.
 
 Middlebury Stereo Evaluation v3 (MiddEval3) and the 2014 data sets; Scharstein et al.,
 GCPR 2014. Depth = baseline * f / (disparity + doffs), here in metres.
@@ -29,7 +29,7 @@ TRUTH_NAMES = ("disp0.pfm", "disp0GT.pfm")
 SEEN_NAMES = ("mask0nocc.png", "mask0-nocc.png")
 
 _MM = 1e-3
-_LEAST_DISPARITY_PX = 1.0  # with doffs; an infinite depth cannot be matched
+_LEAST_DISPARITY_PX = 1.0  # with doffs; keeps the depth range finite
 _LINE = re.compile(r"\s*(\w+)\s*=\s*(.+?)\s*")
 _NEEDED = ("cam0", "cam1", "doffs", "baseline", "ndisp")
 
@@ -40,7 +40,7 @@ def is_middlebury_scene(path: Path) -> bool:
 
 
 def read_middlebury_samples(path: Path, options: SampleOptions) -> list[LazySample]:
-    """The one case of a scene as distributed; see `read_middlebury_case`."""
+    """The one sample of a scene; see `read_middlebury_sample`."""
     return [functools.partial(read_middlebury_sample, path, options)]
 
 
@@ -49,7 +49,7 @@ def read_middlebury_sample(path: Path, options: SampleOptions) -> DepthSample:
 
     Args:
         path: Folder of the scene.
-        options: The depths to match between, where they are given.
+        options: May have the depth range.
 
     Raises:
         WorkspaceError: If a file is missing or broken, or sizes differ.
@@ -91,14 +91,14 @@ def read_calibration(path: Path) -> dict[str, tuple[float, ...]]:
     """Read a calib.txt: each line "name=number" or "name=[a b c; d e f; g h i]".
 
     Raises:
-        WorkspaceError: If it cannot be read, or an entry that we need is missing.
+        WorkspaceError: If it cannot be read, or a required entry is missing.
     """
     try:
         lines = path.read_text(encoding="ascii").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise WorkspaceError(f"{path}: cannot read it as text.") from error
     entries = {}
-    for number, line in enumerate(lines, 1):
+    for line_number, line in enumerate(lines, 1):
         match = _LINE.fullmatch(line)
         if match is None:
             continue
@@ -106,7 +106,7 @@ def read_calibration(path: Path) -> dict[str, tuple[float, ...]]:
             values = tuple(float(it) for it in re.findall(r"[^\s;\[\]]+", match[2]))
         except ValueError as error:
             raise WorkspaceError(
-                f"{path}, line {number}: {match[2]!r} is no number."
+                f"{path}, line {line_number}: {match[2]!r} is not a number."
             ) from error
         entries[match[1]] = values
     for name in _NEEDED:
@@ -122,7 +122,7 @@ def read_calibration(path: Path) -> dict[str, tuple[float, ...]]:
 def depth_from_disparity(
     disparity: FloatMap, calibration: Mapping[str, tuple[float, ...]]
 ) -> DepthMap:
-    """Depth in metres, same shape, float32; 0 where the disparity is not known."""
+    """Depth in metres, same shape, float32; 0 where the disparity is unknown."""
     shifted = disparity + calibration["doffs"][0]
     known = np.isfinite(shifted) & (shifted > 0) & (disparity > 0)
     safe = np.where(known, shifted, 1.0)
@@ -131,9 +131,9 @@ def depth_from_disparity(
 
 
 def _depth_range(calibration: Mapping[str, tuple[float, ...]]) -> tuple[float, float]:
-    """From the largest disparity that calib.txt announces, ndisp, to a disparity of 0.
+    """From the largest disparity of calib.txt, ndisp, to a disparity of 0.
 
-    The tight bounds vmin and vmax, where it has them, come from the truth: not used.
+    The tight bounds vmin and vmax come from the ground truth, so they are ignored.
     """
     doffs, ndisp = calibration["doffs"][0], calibration["ndisp"][0]
     scale = _focal_baseline(calibration)
@@ -154,7 +154,7 @@ def _first_of(path: Path, names: tuple[str, ...]) -> Path:
         if (path / name).is_file():
             return path / name
     raise WorkspaceError(
-        f"{path}: no {' or '.join(names)} in it; unpack the ground truth there too."
+        f"{path}: no {' or '.join(names)}; unpack the ground truth there, too."
     )
 
 

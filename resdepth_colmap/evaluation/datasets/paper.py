@@ -1,22 +1,22 @@
-"""The paper's protocol and figures on ETH3D (Stucker and Schindler, CVPRW 2020).
+"""Protocol and figures of the paper on ETH3D (Stucker and Schindler, CVPRW 2020).
 
-Its section "ETH3D" and its table "Quantitative results on ETH3D indoor scenes".
+Section "ETH3D" and table "Quantitative results on ETH3D indoor scenes".
 """
 
 from typing import NamedTuple
 
 PAPER_MAX_RESIDUAL = 10.0
-"""Residuals beyond it, in metres, are discarded before computing statistics."""
+"""Larger residuals, in metres, are discarded before computing statistics."""
 
 PAPER_IMAGE_WIDTH_PX = 886
-"""Images are made 886 x 590 pixels."""
+"""Images are resized to 886 x 590 pixels."""
 
 
 class PaperRow(NamedTuple):
-    """A row of the paper's table; errors in metres.
+    """A row of the table; errors in metres.
 
     Attributes:
-        num_pairs: Stereo pairs, picked by hand and not published.
+        num_pairs: Number of stereo pairs, picked by hand and not published.
         refined_mae: ResDepth-stereo, mean absolute error.
         refined_rmse: ResDepth-stereo, root mean square error.
         unfiltered_mae: Unfiltered COLMAP, likewise.
@@ -42,4 +42,4 @@ PAPER_ROWS = {
 """The rows by the name of the scene's folder."""
 
 PAPER_OVERALL = PaperRow(26, 0.15, 0.57, 0.35, 1.13)
-"""The last row. Its RMSE is that over all pixels, not the mean of the scenes'."""
+"""The last row. Its RMSE is over all pixels, not the mean over the scenes."""

@@ -1,4 +1,4 @@
-"""What the comparison of depth maps is made on: views whose depth is known."""
+"""Samples of an evaluation: views with ground truth."""
 
 import dataclasses
 from collections.abc import Callable, Sequence
@@ -13,14 +13,14 @@ from resdepth_colmap.scene import DepthMap, UnitColors
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class InitialDepth:
-    """Unfiltered depth, and whose it is.
+    """Unfiltered depth and its origin.
 
     Attributes:
         depth: Shape (H, W), in workspace units; 0 = no depth.
-        origin: Who made it, for people.
-        cpu_s: Processor seconds of all threads; None if it was there already.
-        source_depths: The sources' own maps, in their order, each of the size of its
-            view; None for one without, and for those beyond the end.
+        origin: The matcher or the kind of map, as text.
+        cpu_s: Processor seconds of all threads; None for existing depth.
+        source_depths: The maps of the first sources, each of the size of its view;
+            None for a source without. Sources beyond the end have none.
     """
 
     depth: DepthMap
@@ -31,17 +31,17 @@ class InitialDepth:
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class DepthSample:
-    """One view whose depth is known.
+    """A reference view with its inputs and ground truth.
 
     Attributes:
         name: Name of its image, or of the pair.
         reference: The view.
-        sources: The views to compare it with, best first; at least one.
-        depth_range: Near and far depth to match between, in units.
-        truth: True depth, shape (H, W), in units; 0 = not known.
-        seen: Which pixels the first source sees too, shape (H, W), bool; None = not
-            known.
-        initial: Depth that is there already; None = it has to be matched.
+        sources: Its source views, best first; at least one.
+        depth_range: Nearest and farthest depth to match, in units.
+        truth: True depth, shape (H, W), in units; 0 = unknown.
+        seen: Which pixels the first source sees, too, shape (H, W), bool; None =
+            unknown.
+        initial: Existing depth; None = to be matched.
         colors: The reference in colour, RGB, shape (H, W, 3), in 0..1; None = grey.
         source_colors: The first sources likewise; those beyond the end are grey.
     """
@@ -64,11 +64,11 @@ class DepthSample:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class SampleOptions:
-    """What decides how much of a scene has to be read.
+    """Options of reading samples.
 
     Attributes:
-        stereo: Options of the matcher; it takes up to `max_num_sources`.
-        num_sources: Second views that the network takes.
+        stereo: Options of the matcher; it uses up to `max_num_sources`.
+        num_sources: Number of source views of the network.
     """
 
     stereo: StereoConfig
@@ -76,7 +76,7 @@ class SampleOptions:
 
 
 LazySample = Callable[[], DepthSample]
-"""Reads a case; WorkspaceError if it is broken."""
+"""Reads a sample; WorkspaceError if it is broken."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -84,8 +84,8 @@ class SceneSource:
     """A scene that has not been read yet.
 
     Attributes:
-        name: What it is called in the result; no other scene is called so.
-        read: Finds its cases, at least one; WorkspaceError if the scene is broken.
+        name: Unique name of the scene in the result.
+        read: Finds its samples, at least one; WorkspaceError if the scene is broken.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""The scenes that paths name: workspaces with truth, and scenes of Middlebury."""
+"""The scenes at given paths: workspaces with ground truth, and Middlebury scenes."""
 
 import functools
 from collections.abc import Callable, Sequence
@@ -20,14 +20,14 @@ from resdepth_colmap.evaluation.datasets.workspaces import (
 
 
 def scene_sources(paths: Sequence[Path]) -> tuple[SceneSource, ...]:
-    """What is to be compared; nothing is read yet.
+    """The scenes at the paths; they are read later.
 
     Args:
         paths: Scenes, or folders of scenes.
 
     Returns:
-        One source a scene, in the order of the paths. A path that is neither is a
-        source too: reading it says what is wrong.
+        One source per scene, in the order of the paths. A path that is neither a scene
+        nor a folder of scenes is a source, too: reading it raises the error.
     """
     folders = list(dict.fromkeys(f for path in paths for f in _scenes_at(path)))
     names = distinct_names(folders)
@@ -54,7 +54,7 @@ def _reader(path: Path) -> Callable[[Path, SampleOptions], Sequence[LazySample]]
 
 
 def distinct_names(folders: Sequence[Path]) -> list[str]:
-    """The names of the folders, with as many of their parents as tells them apart."""
+    """The names of the folders, with as many parents as makes them unique."""
     parts = [folder.absolute().parts for folder in folders]
     length = 1
     while length < max(map(len, parts), default=1):

@@ -1,4 +1,4 @@
-"""Dense workspaces with `ground_truth/`: which of their views can be compared."""
+"""Dense workspaces with `ground_truth/` as samples."""
 
 import dataclasses
 import functools
@@ -24,31 +24,36 @@ from resdepth_colmap.io.colmap.model import read_scene
 from resdepth_colmap.io.colmap.workspace import Workspace, check_images, open_workspace
 from resdepth_colmap.io.images import read_gray
 from resdepth_colmap.matching.patch_match import MatchView
-from resdepth_colmap.pipeline.initial_map import candidate_kinds, choose_initial_map
+from resdepth_colmap.pipeline.initial_map import (
+    InitialMap,
+    candidate_kinds,
+    choose_initial_map,
+)
 from resdepth_colmap.pipeline.refine.cross_view import NUM_SOURCE_MAPS
 from resdepth_colmap.pipeline.view_images import ViewImages
 from resdepth_colmap.scene import DepthMap, Scene, UnitColors, View
 
 TRUTH_FOLDER = "ground_truth"
 SEEN_SUFFIX = ".nonoccluded.png"
-IMAGE_CACHE_BYTES = 256 << 20  # of images that several views are compared with
+IMAGE_CACHE_BYTES = 256 << 20
 _SEEN = 1  # 255 in the file; occluded pixels are grey
-_WAY_OUT = "data/README.md says what a workspace with truth holds"
+_WAY_OUT = "see data/README.md for the layout of a workspace with ground truth"
 
 
 def read_workspace_samples(path: Path, options: SampleOptions) -> list[LazySample]:
-    """The views of a workspace whose true depth is known, with the maps that it has.
+    """The views of a workspace with ground truth, and their existing maps.
 
-    A view starts from its fullest map; one without any is to be matched against the
-    sources that patch-match.cfg names, or the best ones. Nothing is written.
+    The initial depth of a view is its map with the fewest holes; a view without a map
+    is to be matched against the sources in patch-match.cfg, or the best ones. Nothing
+    is written.
 
     Args:
-        path: A dense workspace with `ground_truth/<image>.bin`, COLMAP's map format.
-        options: How many sources to read.
+        path: A dense workspace with `ground_truth/<image>.bin`, in COLMAP's map format.
+        options: Matcher and number of sources.
 
     Raises:
-        WorkspaceError: If the workspace or its truth is broken, missing, or of another
-            size than the image.
+        WorkspaceError: If the workspace or its ground truth is missing, broken, or
+            differs from the image in size.
     """
     workspace = open_workspace(path)
     scene = read_scene(workspace.sparse_path, workspace.images_path, workspace.path)
@@ -65,13 +70,13 @@ def _names_with_truth(workspace: Workspace, scene: Scene) -> list[str]:
     folder = workspace.path / TRUTH_FOLDER
     if not folder.is_dir():
         raise WorkspaceError(
-            f"{workspace.path}: no {TRUTH_FOLDER}/ in it, so there is nothing to "
-            f"compare with; {_WAY_OUT}."
+            f"{workspace.path}: no {TRUTH_FOLDER}/, so there is nothing to compare "
+            f"with; {_WAY_OUT}."
         )
     names = [v.name for v in scene.views if workspace.truth_path(v.name).is_file()]
     if not names:
         raise WorkspaceError(
-            f"{folder}: no map in it belongs to an image of the model (that of "
+            f"{folder}: no map of any image of the model (that of "
             f"{scene.views[0].name} would be {scene.views[0].name}.bin); {_WAY_OUT}."
         )
     return names
@@ -95,7 +100,7 @@ def _sample(
     if not choices:
         raise WorkspaceError(
             f"{workspace.path}: no other view overlaps with {view.name}, so it can be "
-            "neither matched nor refined; take its map out of ground_truth/."
+            "neither matched nor refined; remove its map from ground_truth/."
         )
     sources = [choice.index for choice in choices]
     if initial is not None:
@@ -139,10 +144,9 @@ def _seen(workspace: Workspace, view: View) -> npt.NDArray[np.bool_] | None:
 
 
 def _initial(workspace: Workspace, view: View) -> InitialDepth | None:
-    kinds = candidate_kinds(workspace, view.name)
-    if not kinds:
+    found = _fullest_map(workspace, view)
+    if found is None:
         return None
-    found = choose_initial_map(workspace, view.name, view.camera, kinds)
     depth = read_depth_map(found.path)
     _check_shape(found.path, depth.shape, view)
     if not found.filled:
@@ -151,13 +155,19 @@ def _initial(workspace: Workspace, view: View) -> InitialDepth | None:
 
 
 def _map_of(workspace: Workspace, view: View) -> DepthMap | None:
-    """A source's own map at the size of its image; None if it has none."""
+    """The map of a source at the size of its image; None if it has none."""
+    found = _fullest_map(workspace, view)
+    if found is None:
+        return None
+    size_px = (view.camera.width_px, view.camera.height_px)
+    return nearest_resized(read_depth_map(found.path), size_px)
+
+
+def _fullest_map(workspace: Workspace, view: View) -> InitialMap | None:
     kinds = candidate_kinds(workspace, view.name)
     if not kinds:
         return None
-    found = choose_initial_map(workspace, view.name, view.camera, kinds)
-    size_px = (view.camera.width_px, view.camera.height_px)
-    return nearest_resized(read_depth_map(found.path), size_px)
+    return choose_initial_map(workspace, view.name, view.camera, kinds)
 
 
 def _check_shape(path: Path, shape: tuple[int, ...], view: View) -> None:
@@ -165,13 +175,13 @@ def _check_shape(path: Path, shape: tuple[int, ...], view: View) -> None:
     if shape != expected:
         raise WorkspaceError(
             f"{path}: {shape[1]} x {shape[0]} pixels, but its image has "
-            f"{expected[1]} x {expected[0]}; maps, masks and truth have to be as large "
-            "as the image to be compared."
+            f"{expected[1]} x {expected[0]}; maps, masks and ground truth need the "
+            "size of the image."
         )
 
 
 def _listed(workspace: Workspace, scene: Scene, name: str) -> list[int] | None:
-    """The sources that patch-match.cfg names for an image; None if it names none."""
+    """The sources of an image in patch-match.cfg; None if it lists none."""
     path = workspace.stereo_path / "patch-match.cfg"
     spec = read_sources(path).get(name) if path.is_file() else None
     if spec is None or spec.kind is not SourceKind.EXPLICIT:

@@ -1,1 +1,1 @@
-"""`evaluate depth` and `evaluate eth3d`: depth maps against the truth."""
+"""The commands `evaluate depth` and `evaluate eth3d`: depth against ground truth."""

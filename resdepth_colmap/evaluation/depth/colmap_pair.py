@@ -1,4 +1,4 @@
-"""COLMAP's own PatchMatch on a few views, unfiltered: what the paper starts from."""
+"""COLMAP's PatchMatch on a few views, unfiltered: the initial depth of the paper."""
 
 import tempfile
 from collections.abc import Sequence
@@ -25,16 +25,16 @@ from resdepth_colmap.scene import DepthMap
 def match_by_colmap(
     views: Sequence[MatchView], depth_range: tuple[float, float], config: StereoConfig
 ) -> DepthMap:
-    """Match the first view against the others, in a workspace made for it.
+    """Match the first view against the others, in a temporary workspace.
 
     Args:
         views: The reference and its sources.
         depth_range: Nearest and farthest depth, in units.
-        config: Window and spread of the weights; COLMAP's other defaults are kept.
+        config: Window and weights; the other options keep COLMAP's defaults.
 
     Returns:
-        The photometric depth map without COLMAP's filter, shape (H, W), in units; what
-        is not finite has become 0.
+        The photometric depth map without COLMAP's filter, shape (H, W), in units; 0 =
+        no depth.
 
     Raises:
         BackendUnavailableError: If COLMAP fails.
@@ -60,11 +60,11 @@ def match_by_colmap(
 
 
 def write_pair_workspace(path: Path, views: Sequence[MatchView]) -> None:
-    """Write a dense workspace of views, the first of which is to be matched.
+    """Write a dense workspace in which COLMAP matches the first view.
 
     Args:
         path: An empty folder.
-        views: The reference and its sources; their images are stored with 8 bits.
+        views: The reference and its sources; images are stored with 8 bits.
 
     Raises:
         WorkspaceError: If a file cannot be written.
@@ -95,7 +95,7 @@ def _camera(camera_id: int, view: MatchView) -> pycolmap.Camera:
         model="PINHOLE",
         width=width_px,
         height=height_px,
-        # Index to COLMAP's origin of pixels.
+        # Index to COLMAP's pixel origin.
         params=[K[0, 0], K[1, 1], K[0, 2] + CENTER_PX, K[1, 2] + CENTER_PX],
     )
 

@@ -1,4 +1,4 @@
-"""Compare depth maps with the truth, scene after scene; a broken one stops no other."""
+"""Depth maps against ground truth, scene by scene; a broken scene stops no other."""
 
 import dataclasses
 import datetime
@@ -37,14 +37,14 @@ logger = logging.getLogger(__name__)
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class EvaluationOptions:
-    """How depth maps are made and compared.
+    """How depth maps are matched, refined and compared.
 
     Attributes:
-        refine: Weights, passes, tiles and device.
-        stereo: Options of the matcher, where depth has to be matched.
-        backend: Who matches then: auto, COLMAP (CUDA) or our own on the CPU.
-        cache: Where matched depth is kept from one run to the next.
-        max_residual: Larger errors, in units, are discarded; None = none is.
+        refine: Options of the refinement.
+        stereo: Options of the matcher, for samples without depth.
+        backend: The matcher: auto, COLMAP (CUDA) or the CPU.
+        cache: Keeps matched depth from run to run; None = no cache.
+        max_residual: Larger errors, in units, are discarded; None = no limit.
     """
 
     refine: RefineConfig = dataclasses.field(default_factory=RefineConfig)
@@ -54,52 +54,41 @@ class EvaluationOptions:
     max_residual: float | None = PAPER_MAX_RESIDUAL
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class Listener:
-    """Who is told while the comparison runs.
-
-    Attributes:
-        on_failure: Told the name of a scene that is broken, and what is wrong.
-        progress: Shows one stage of all scenes.
-    """
-
-    on_failure: Callable[[str, str], None] | None = None
-    progress: Progress = dataclasses.field(default_factory=SilentProgress)
-
-
 def evaluate_scenes(
     sources: Sequence[SceneSource],
     options: EvaluationOptions,
-    listener: Listener | None = None,
+    on_failure: Callable[[str, str], None] | None = None,
+    progress: Progress | None = None,
 ) -> DepthReport:
-    """Measure every scene that can be measured.
+    """Evaluate every scene that can be read.
 
     Args:
         sources: The scenes.
-        options: How.
-        listener: Who is told.
+        options: How depth maps are matched, refined and compared.
+        on_failure: Called with the name of a broken scene and the reason.
+        progress: Reports the progress, as one stage.
 
     Returns:
-        The results, and what is wrong with the scenes that have none.
+        The results, and the reasons for the scenes without one.
 
     Raises:
         WeightsError: If the weights cannot be read.
-        BackendUnavailableError: If a device or matcher that was asked for is not here.
+        BackendUnavailableError: If the requested device or matcher is not available.
     """
-    listener = listener or Listener()
+    progress = progress or SilentProgress()
     backend = matching_backend(options.backend)
     device = resolve_device(options.refine.device)
     network = for_inference(load_weights(options.refine.weights, device))
     _warm_up(network, options.refine)
     results, failed = [], {}
-    with listener.progress.stage("Evaluating", len(sources)) as advance:
+    with progress.stage("Evaluating", len(sources)) as advance:
         for source in sources:
             try:
                 result = _measure_scene(source, network, options, backend, advance)
-            except ResDepthError as error:  # also a matcher that failed on it
+            except ResDepthError as error:
                 failed[source.name] = " ".join(str(error).split())
-                if listener.on_failure:
-                    listener.on_failure(source.name, failed[source.name])
+                if on_failure:
+                    on_failure(source.name, failed[source.name])
             else:
                 results.append(result)
     return DepthReport(
@@ -145,7 +134,7 @@ def _measure_scene(
 
 
 def _warm_up(network: ResDepthNet, config: RefineConfig) -> None:
-    """Refine a tiny view: the first call is not measured."""
+    """Refine a tiny view: the first call is slower."""
     size = _WARM_UP_PX
     gray = np.random.default_rng(0).random((size, size), dtype=np.float32)
     K = np.array([[size, 0, size / 2], [0, size, size / 2], [0, 0, 1.0]])

@@ -1,14 +1,14 @@
-"""Matched depth, kept between measurements: matching takes longest, and seldom changes.
+"""A cache of matched depth maps, since matching is most of the time of an evaluation.
 
-A file is named after a hash of all that its depth depends on, the matcher's own source
-included: a matcher that has changed is never measured by its old depth.
+The name of a file has a hash of all inputs, which include the source of the matcher: a
+changed matcher never gets the depth of an earlier one.
 """
 
 import dataclasses
 import hashlib
 import io
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -27,12 +27,12 @@ _SOURCE = "source_{}"
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class Matching:
-    """What the matcher found, and what that cost.
+    """A matched depth map and its cost.
 
     Attributes:
         depth: Shape (H, W), float32, in workspace units; all > 0.
         cpu_s: Processor seconds of all threads.
-        source_depths: What was found in the sources, in their order; maybe nothing.
+        source_depths: Maps of the sources, in their order; () = none.
     """
 
     depth: DepthMap
@@ -45,50 +45,43 @@ class MatchCache:
     """A folder of matched depth maps.
 
     Attributes:
-        folder: Where the files are; it is made when it is needed.
+        folder: Where the files are; created when needed.
     """
 
     folder: Path
 
-    def find(
+    def get(
         self,
         name: str,
         views: Sequence[MatchView],
         depth_range: tuple[float, float],
         config: StereoConfig,
-    ) -> Matching | None:
-        """What `add` was given for the same input; None if it was given nothing."""
-        path = self._path(name, views, depth_range, config)
-        if not path.is_file():
-            return None
-        with np.load(path) as file:
-            names = [_SOURCE.format(index) for index in range(len(views) - 1)]
-            return Matching(
-                depth=file["depth"],
-                cpu_s=float(file["cpu_s"]),
-                source_depths=tuple(file[name] for name in names if name in file),
-            )
+        match: Callable[[], Matching],
+    ) -> Matching:
+        """The result of an earlier call for the same input, else of `match`.
 
-    def add(
-        self,
-        name: str,
-        views: Sequence[MatchView],
-        depth_range: tuple[float, float],
-        config: StereoConfig,
-        matching: Matching,
-    ) -> None:
-        """Keep a result.
+        Args:
+            name: Start of the name of the file.
+            views: The reference and its sources.
+            depth_range: Nearest and farthest depth, in units.
+            config: Options of the matcher.
+            match: Called if the cache has no result.
 
         Raises:
             WorkspaceError: If the file cannot be written.
         """
+        path = self._path(name, views, depth_range, config)
+        if path.is_file():
+            return _read(path)
+        matching = match()
         data = io.BytesIO()
         arrays: dict[str, Any] = {
             _SOURCE.format(index): depth
             for index, depth in enumerate(matching.source_depths)
         }
         np.savez(data, depth=matching.depth, cpu_s=matching.cpu_s, **arrays)
-        write_whole(self._path(name, views, depth_range, config), data.getvalue())
+        write_whole(path, data.getvalue())
+        return matching
 
     def _path(
         self,
@@ -106,3 +99,13 @@ class MatchCache:
             for source in sorted(Path(folder).glob("*.py")):
                 digest.update(source.read_bytes())
         return self.folder / f"{name}-{digest.hexdigest()[:_HASH_LENGTH]}.npz"
+
+
+def _read(path: Path) -> Matching:
+    with np.load(path) as file:
+        num_sources = len(file.files) - 2
+        return Matching(
+            depth=file["depth"],
+            cpu_s=float(file["cpu_s"]),
+            source_depths=tuple(file[_SOURCE.format(i)] for i in range(num_sources)),
+        )

@@ -1,7 +1,7 @@
-"""The three depth maps of a case against its truth: unfiltered, its median, refined.
+"""Three methods on a sample, against its ground truth: unfiltered, median, refined.
 
-The protocol is the paper's: unfiltered depth of a matcher, the 5 x 5 median of it as
-the plain baseline, and refined depth; residuals beyond a limit are discarded.
+The protocol of the paper: the unfiltered depth of a matcher, its 5 x 5 median as the
+baseline, and the refined depth; residuals beyond a limit are discarded.
 """
 
 import dataclasses
@@ -15,7 +15,7 @@ from resdepth_colmap.evaluation.datasets.sample import DepthSample, InitialDepth
 from resdepth_colmap.evaluation.depth.sample_refinement import refine_sample
 from resdepth_colmap.evaluation.metrics.depth_metrics import median_filtered
 from resdepth_colmap.evaluation.metrics.depth_regions import edge_region
-from resdepth_colmap.evaluation.metrics.pooled_metrics import ErrorSample
+from resdepth_colmap.evaluation.metrics.pooled_metrics import PooledErrors
 from resdepth_colmap.network.unet import ResDepthNet
 
 METHODS = ("unfiltered", "median", "refined")
@@ -24,24 +24,24 @@ REGIONS = ("all", "edges", "flat")
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class SampleResult:
-    """What was measured on one view.
+    """The errors of one sample.
 
     Attributes:
-        name: That of the case.
-        origin: Who made the initial depth.
-        errors: By region, then by arm; the keys are those of `REGIONS` and `ARMS`.
-        seen: Errors of the initial depth where the first source sees the surface too;
-            None if that is not known.
-        seen_median_relative_error: Median there of error over true depth; likewise.
+        name: Name of the sample.
+        origin: Where the initial depth comes from.
+        errors: By region, then by method; see `REGIONS` and `METHODS`.
+        seen: Errors of the initial depth at pixels that the first source sees, too;
+            None if those are unknown.
+        seen_median_relative_error: Median of error over true depth there; likewise.
         megapixels: Size of the view, in millions of pixels.
-        matching_cpu_s: Processor seconds of all threads; None if depth was there.
-        refining_cpu_s: Likewise, of all passes of the last round.
+        matching_cpu_s: Processor seconds of all threads; None for existing depth.
+        refining_cpu_s: Likewise, of the last outer iteration.
     """
 
     name: str
     origin: str
-    errors: Mapping[str, Mapping[str, ErrorSample]]
-    seen: ErrorSample | None
+    errors: Mapping[str, Mapping[str, PooledErrors]]
+    seen: PooledErrors | None
     seen_median_relative_error: float | None
     megapixels: float
     matching_cpu_s: float | None
@@ -55,14 +55,14 @@ def measure_sample(
     config: RefineConfig,
     max_residual: float | None,
 ) -> SampleResult:
-    """Refine the initial depth and compare all three maps with the truth.
+    """Refine the initial depth and compare all three maps with the ground truth.
 
     Args:
-        sample: The view and its truth.
+        sample: The view and its ground truth.
         initial: Its initial depth, of the same size.
         network: On the device to run on.
-        config: Rounds, passes and tiles.
-        max_residual: Larger errors, in units, are discarded; None = none is.
+        config: Outer and inner iterations, and tiles.
+        max_residual: Larger errors, in units, are discarded; None = no limit.
     """
     truth, depth = sample.truth, initial.depth
     refined = refine_sample(sample, initial, network, config)
@@ -79,12 +79,14 @@ def measure_sample(
         origin=initial.origin,
         errors={
             region: {
-                method: ErrorSample.of(values, truth, inside, max_residual)
+                method: PooledErrors.of(values, truth, inside, max_residual)
                 for method, values in methods.items()
             }
             for region, inside in regions.items()
         },
-        seen=None if seen is None else ErrorSample.of(depth, truth, seen, max_residual),
+        seen=None
+        if seen is None
+        else PooledErrors.of(depth, truth, seen, max_residual),
         seen_median_relative_error=None
         if seen is None
         else _median_relative_error(sample, initial, seen),

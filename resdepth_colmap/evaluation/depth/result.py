@@ -1,18 +1,19 @@
-"""The result of comparing depth maps with the truth, scene by scene and overall."""
+"""The result of an evaluation of depth maps, scene by scene and overall."""
 
 import dataclasses
 import datetime
 import math
+import statistics
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from resdepth_colmap.config import RefineConfig, StereoConfig
 from resdepth_colmap.evaluation.depth.methods import METHODS, REGIONS, SampleResult
-from resdepth_colmap.evaluation.metrics.depth_metrics import DepthMetrics
-from resdepth_colmap.evaluation.metrics.pooled_metrics import ErrorSample, pooled
+from resdepth_colmap.evaluation.metrics.pooled_metrics import PooledErrors, pooled
+from resdepth_colmap.evaluation.plain import finite_mean, plain
 
-Errors = Mapping[str, Mapping[str, ErrorSample]]
-"""By region, then by arm."""
+Errors = Mapping[str, Mapping[str, PooledErrors]]
+"""By region, then by method."""
 
 _REFINE_OPTIONS = (
     "inner_iterations",
@@ -25,11 +26,11 @@ _REFINE_OPTIONS = (
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class SceneResult:
-    """What was measured on one scene.
+    """The errors of one scene.
 
     Attributes:
-        name: What it is called.
-        samples: One result a view.
+        name: Name of the scene.
+        samples: The results of its samples.
     """
 
     name: str
@@ -40,54 +41,46 @@ class SceneResult:
         """Over the pixels of all views."""
         return pooled_errors([sample.errors for sample in self.samples])
 
-    @property
-    def mae_ratio(self) -> float:
-        """Mean absolute error, refined over unfiltered; NaN if that is 0."""
+    def ratio(self, error: str) -> float:
+        """An error, "mae" or "medae", refined over unfiltered; NaN if that is 0."""
         methods = self.errors["all"]
-        return _ratio(methods["refined"].metrics.mae, methods["unfiltered"].metrics.mae)
-
-    @property
-    def medae_ratio(self) -> float:
-        """Median absolute error, refined over unfiltered; NaN if that is 0."""
-        methods = self.errors["all"]
-        return _ratio(
-            methods["refined"].metrics.medae, methods["unfiltered"].metrics.medae
+        refined, unfiltered = (
+            float(getattr(methods[method].metrics, error))
+            for method in ("refined", "unfiltered")
         )
+        return refined / unfiltered if unfiltered else math.nan
 
     def to_mapping(self) -> dict[str, Any]:
         """Plain values, ready for JSON."""
-        mapping: dict[str, Any] = {
+        mapping = {
             "initial": sorted({sample.origin for sample in self.samples}),
             "num_views": len(self.samples),
             "view_names": [sample.name for sample in self.samples],
-            **plain_errors(self.errors),
-        }
-        if all(sample.seen is not None for sample in self.samples):
-            mapping["unfiltered_seen_by_both"] = self._seen()
-        mapping |= {
+            **_by_name(self.errors),
+            **self._seen(),
             "matching_cpu_s_per_mp": self._per_megapixel("matching_cpu_s"),
             "refining_cpu_s_per_mp": self._per_megapixel("refining_cpu_s"),
-            "mae_ratio": plain(self.mae_ratio),
-            "medae_ratio": plain(self.medae_ratio),
+            "mae_ratio": self.ratio("mae"),
+            "medae_ratio": self.ratio("medae"),
         }
         if len(self.samples) > 1:
             mapping["views"] = {
-                sample.name: {"initial": sample.origin, **plain_errors(sample.errors)}
+                sample.name: {"initial": sample.origin, **_by_name(sample.errors)}
                 for sample in self.samples
             }
-        return mapping
+        return dict(plain(mapping))
 
-    def _seen(self) -> dict[str, float | int | None]:
-        samples = [sample.seen for sample in self.samples if sample.seen is not None]
+    def _seen(self) -> dict[str, Any]:
+        seen = [sample.seen for sample in self.samples if sample.seen is not None]
+        if len(seen) < len(self.samples):
+            return {}
         medians = [sample.seen_median_relative_error for sample in self.samples]
-        finite = [m for m in medians if m is not None and math.isfinite(m)]
-        return {
-            **plain_metrics(pooled(samples).metrics),
-            "median_relative_error": plain(_mean(finite)),
-        }
+        median = finite_mean(it for it in medians if it is not None)
+        errors = {**pooled(seen).metrics.to_mapping(), "median_relative_error": median}
+        return {"unfiltered_seen_by_both": errors}
 
     def _per_megapixel(self, name: str) -> float | None:
-        timed = [c for c in self.samples if getattr(c, name) is not None]
+        timed = [it for it in self.samples if getattr(it, name) is not None]
         megapixels = sum(sample.megapixels for sample in timed)
         if not megapixels:
             return None
@@ -97,18 +90,18 @@ class SceneResult:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class DepthReport:
-    """The comparison's result, and what it was made with.
+    """The result of an evaluation, and its options.
 
     Attributes:
         date: Day of the measurement.
         weights_sha256: Hash of the weights file.
         refine: Options of the refinement.
         stereo: Options of the matcher.
-        max_residual: Larger errors were discarded, in units; None = none was.
+        max_residual: Larger errors were discarded, in units; None = no limit.
         hardware: The machine that measured.
-        versions: Of Python and the packages that matter.
-        scenes: One result a scene.
-        failed: What is wrong with each scene that could not be measured, by name.
+        versions: Of Python and the main packages.
+        scenes: The results of the scenes.
+        failed: The reasons for scenes without a result, by name.
     """
 
     date: datetime.date
@@ -129,7 +122,7 @@ class DepthReport:
         return pooled_errors([scene.errors for scene in self.scenes])
 
     def to_mapping(self) -> dict[str, Any]:
-        """Plain values, ready for JSON; no path of this machine among them."""
+        """Plain values, ready for JSON; without absolute paths."""
         refine = self.refine.to_mapping()
         errors = self.errors
         return {
@@ -143,17 +136,21 @@ class DepthReport:
             "hardware": self.hardware,
             "versions": dict(self.versions),
             "scenes": {scene.name: scene.to_mapping() for scene in self.scenes},
-            "overall": None if errors is None else plain_errors(errors),
+            "overall": None if errors is None else plain(_by_name(errors)),
             "mean": {
-                "mae_ratio": plain(_mean([s.mae_ratio for s in self.scenes])),
-                "medae_ratio": plain(_mean([s.medae_ratio for s in self.scenes])),
+                f"{error}_ratio": plain(self._mean_ratio(error))
+                for error in ("mae", "medae")
             },
             "failed": dict(self.failed),
         }
 
+    def _mean_ratio(self, error: str) -> float:
+        ratios = [scene.ratio(error) for scene in self.scenes]
+        return statistics.fmean(ratios) if ratios else math.nan
+
 
 def pooled_errors(errors: Sequence[Errors]) -> Errors:
-    """The errors over all pixels of several results, by region and arm."""
+    """The errors over all pixels of several results, by region and method."""
     return {
         region: {
             method: pooled([it[region][method] for it in errors]) for method in METHODS
@@ -162,29 +159,10 @@ def pooled_errors(errors: Sequence[Errors]) -> Errors:
     }
 
 
-def plain_errors(errors: Errors) -> dict[str, Any]:
-    """For JSON: the arms of the whole map by their names, the regions beside them."""
-    by_region = {
-        region: {method: plain_metrics(methods[method].metrics) for method in METHODS}
+def _by_name(errors: Errors) -> dict[str, Any]:
+    """The errors over all pixels by method, and beside them those of each region."""
+    named = {
+        region: {method: it.metrics.to_mapping() for method, it in methods.items()}
         for region, methods in errors.items()
     }
-    return {**by_region["all"], **{r: by_region[r] for r in REGIONS if r != "all"}}
-
-
-def plain_metrics(metrics: DepthMetrics) -> dict[str, float | int | None]:
-    """For JSON: six digits, None where there is no number."""
-    values = metrics.to_mapping()
-    return {k: v if v is None else round(v, 6) for k, v in values.items()}
-
-
-def plain(value: float) -> float | None:
-    """For JSON: six digits, None for NaN."""
-    return None if math.isnan(value) else round(value, 6)
-
-
-def _ratio(value: float, reference: float) -> float:
-    return value / reference if reference else float("nan")
-
-
-def _mean(values: Sequence[float]) -> float:
-    return sum(values) / len(values) if values else float("nan")
+    return {**named.pop("all"), **named}

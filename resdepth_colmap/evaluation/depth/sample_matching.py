@@ -1,11 +1,9 @@
-"""Initial depth of a case: what is there, or matched now, by COLMAP or by us."""
+"""The initial depth of a sample: existing, or matched by COLMAP or on the CPU."""
 
 import functools
 import re
 import time
 from collections.abc import Sequence
-
-import numpy as np
 
 from resdepth_colmap.config import StereoBackend, StereoConfig
 from resdepth_colmap.errors import BackendUnavailableError, ConfigError
@@ -13,22 +11,22 @@ from resdepth_colmap.evaluation.datasets.sample import DepthSample, InitialDepth
 from resdepth_colmap.evaluation.depth.colmap_pair import match_by_colmap
 from resdepth_colmap.evaluation.depth.match_cache import MatchCache, Matching
 from resdepth_colmap.matching.patch_match import MatchView, match_view
+from resdepth_colmap.pipeline.stereo.warm_up import warm_up
 from resdepth_colmap.scene import DepthMap
 
 ORIGINS = {
     StereoBackend.CPU: "our PatchMatch (CPU)",
     StereoBackend.COLMAP: "COLMAP's PatchMatch (CUDA), unfiltered",
 }
-_WARM_UP_PX = 32
 _UNSAFE = re.compile(r"[^\w.-]+", re.ASCII)
 
 
 def matching_backend(requested: StereoBackend) -> StereoBackend:
-    """Who matches: COLMAP where pycolmap has CUDA, else we do.
+    """The matcher: COLMAP where pycolmap has CUDA, else the CPU.
 
     Raises:
-        ConfigError: If existing maps were asked for: those are no one's to match.
-        BackendUnavailableError: If COLMAP was asked for and has no CUDA here.
+        ConfigError: If existing maps are requested: the scenes have none.
+        BackendUnavailableError: If COLMAP is requested and has no CUDA.
     """
     if requested is StereoBackend.EXISTING:
         raise ConfigError(
@@ -56,24 +54,24 @@ def initial_depth(
     config: StereoConfig,
     cache: MatchCache | None = None,
 ) -> InitialDepth:
-    """The depth that a case starts from.
+    """The depth that the refinement of a sample starts from.
 
     Args:
         scene: Name of its scene, for the file in the cache.
-        sample: The view; depth that it has already is taken.
-        backend: Who matches it otherwise, as `matching_backend` says.
+        sample: The view; existing depth is used.
+        backend: The matcher, where there is none.
         config: Options of the matcher.
-        cache: Where matched depth is kept.
+        cache: Keeps matched depth.
     """
     if sample.initial is not None:
         return sample.initial
     views = (sample.reference, *sample.sources)
     name = cache_name(scene, sample.name, backend)
-    found = cache.find(name, views, sample.depth_range, config) if cache else None
-    if found is None:
-        found = _match(views, sample.depth_range, backend, config)
-        if cache:
-            cache.add(name, views, sample.depth_range, config, found)
+    match = functools.partial(_match, views, sample.depth_range, backend, config)
+    if cache is None:
+        found = match()
+    else:
+        found = cache.get(name, views, sample.depth_range, config, match)
     return InitialDepth(
         depth=found.depth,
         origin=ORIGINS[backend],
@@ -83,7 +81,7 @@ def initial_depth(
 
 
 def cache_name(scene: str, sample: str, backend: StereoBackend) -> str:
-    """What the file of a case in the cache begins with."""
+    """The start of the name of the file of a sample in the cache."""
     return _UNSAFE.sub("_", f"{scene}-{sample}-{backend}")
 
 
@@ -105,9 +103,8 @@ def _match_here(
 ) -> Matching:
     """Match the first view, in both passes unless `geom_consistency` is off.
 
-    The photometric maps of the sources, which the geometric pass and the refinement
-    use, count for the sources and not for this view, as in a workspace, where each is
-    made once.
+    The seconds leave out the photometric maps of the sources, which the geometric pass
+    and the refinement use: in a workspace each of them is matched once.
     """
     start = time.process_time()
     found = match_view(views[0], views[1:], depth_range, config)
@@ -127,7 +124,7 @@ def _match_here(
 def _source_depths(
     views: Sequence[MatchView], depth_range: tuple[float, float], config: StereoConfig
 ) -> list[DepthMap]:
-    """Photometric depth of every view but the first, each from all the others."""
+    """Photometric depth of every view but the first, each matched with all others."""
     found = []
     for index in range(1, len(views)):
         others = [*views[:index], *views[index + 1 :]]
@@ -137,11 +134,5 @@ def _source_depths(
 
 @functools.cache
 def _compile() -> None:
-    """Match a tiny pair, once: compiling is not measured."""
-    size = _WARM_UP_PX
-    gray = np.random.default_rng(0).random((size, size), dtype=np.float32)
-    K = np.array([[size, 0, size / 2], [0, size, size / 2], [0, 0, 1.0]])
-    left, right = np.eye(3, 4), np.eye(3, 4)
-    right[0, 3] = -0.1
-    views = [MatchView(gray=gray, K=K, cam_from_world=pose) for pose in (left, right)]
-    _match_here(views, (1.0, 2.0), StereoConfig(num_iterations=1))
+    """Compile the matcher once, outside of the measured time."""
+    warm_up(StereoConfig(filter=False))

@@ -1,6 +1,7 @@
-"""Refining a case as a workspace would be: its sources' maps in earlier rounds, too."""
+"""Refinement of a sample as in a workspace, with the maps of its sources."""
 
 import functools
+import itertools
 import time
 from typing import NamedTuple
 
@@ -17,12 +18,12 @@ from resdepth_colmap.scene import DepthMap, UnitColors, cam_from_cam
 
 
 class RefinedSample(NamedTuple):
-    """What became of a case.
+    """The refined depth of a sample.
 
     Attributes:
         depth: Of its reference, shape (H, W), in units.
-        cpu_s: Processor seconds of all threads, for the last round of the reference:
-            earlier ones count for the views that they refine, as in a workspace.
+        cpu_s: Processor seconds of all threads, of the last outer iteration of the
+            reference.
     """
 
     depth: DepthMap
@@ -30,7 +31,7 @@ class RefinedSample(NamedTuple):
 
 
 class _SampleView(NamedTuple):
-    """One of a case's views; no depth = there is no map of it."""
+    """A view of a sample; no depth = it has no map."""
 
     view: MatchView
     depth: DepthMap | None
@@ -43,31 +44,33 @@ def refine_sample(
     network: ResDepthNet,
     config: RefineConfig,
 ) -> RefinedSample:
-    """Refine the depth of a case's reference.
+    """Refine the depth of the reference of a sample.
 
-    In earlier rounds its sources are refined as far as the case shows what they look
-    at: from each other and from the reference.
+    Earlier outer iterations refine the sources, too, from each other and from the
+    reference, as far as the sample has the views for it.
 
     Args:
         sample: The views.
         initial: Depth of the reference, and of the sources where there is any.
         network: On the device to run on.
-        config: Rounds, passes and tiles.
+        config: Outer and inner iterations, and tiles.
     """
     views = _views(sample, initial)
     num_earlier = config.outer_iterations - 1 if network.config.source_depth else 0
 
     @functools.cache
-    def map_of(index: int, num_rounds: int) -> DepthMap | None:
+    def map_of(index: int, num_iterations: int) -> DepthMap | None:
         depth = views[index].depth
-        if num_rounds == 0 or depth is None or not (depth > 0).any():
+        if num_iterations == 0 or depth is None or not (depth > 0).any():
             return depth
-        return refine_view(inputs(index, num_rounds - 1), network, config).depth
+        return refine_view(inputs(index, num_iterations - 1), network, config).depth
 
-    def inputs(index: int, num_rounds: int) -> ViewInputs:
-        """Of a view after so many rounds of the others."""
+    def inputs(index: int, num_iterations: int) -> ViewInputs:
+        """Of a view, after that many outer iterations of the others."""
         others = [other for other in range(len(views)) if other != index]
-        maps = {other: map_of(other, num_rounds) for other in others[:NUM_SOURCE_MAPS]}
+        maps = {
+            other: map_of(other, num_iterations) for other in others[:NUM_SOURCE_MAPS]
+        }
         return _inputs(views, index, maps)
 
     own = inputs(0, num_earlier)
@@ -78,20 +81,21 @@ def refine_sample(
 
 def _views(sample: DepthSample, initial: InitialDepth) -> list[_SampleView]:
     """The reference first."""
-    found = [_SampleView(sample.reference, initial.depth, sample.colors)]
-    for place, source in enumerate(sample.sources):
-        depths = initial.source_depths[place : place + 1] or (None,)
-        colors = sample.source_colors[place : place + 1] or (None,)
-        found.append(_SampleView(source, *depths, *colors))
-    return found
+    sources = itertools.zip_longest(
+        sample.sources, initial.source_depths, sample.source_colors
+    )
+    return [
+        _SampleView(sample.reference, initial.depth, sample.colors),
+        *itertools.starmap(_SampleView, itertools.islice(sources, len(sample.sources))),
+    ]
 
 
 def _inputs(
     views: list[_SampleView], index: int, maps: dict[int, DepthMap | None]
 ) -> ViewInputs:
     own = views[index]
-    assert own.depth is not None  # noqa: S101 (asked only where it is there)
-    others = [view.view for place, view in enumerate(views) if place != index]
+    assert own.depth is not None  # noqa: S101 (for the type checker)
+    others = [view.view for i, view in enumerate(views) if i != index]
     return ViewInputs(
         depth=own.depth,
         gray=own.view.gray,
@@ -108,10 +112,10 @@ def _inputs(
         source_maps=tuple(
             SourceMap(
                 depth=depth,
-                K=views[place].view.K,
-                source_from_reference=cam_from_cam(views[place].view, own.view),
+                K=views[i].view.K,
+                source_from_reference=cam_from_cam(views[i].view, own.view),
             )
-            for place, depth in maps.items()
+            for i, depth in maps.items()
             if depth is not None
         ),
     )

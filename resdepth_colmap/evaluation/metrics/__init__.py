@@ -1,1 +1,1 @@
-"""Figures of depth maps: against the truth, and without any."""
+"""Metrics of depth maps, against ground truth and reference-free."""

@@ -1,11 +1,12 @@
-"""How far a depth map is from the truth: the paper's figures, and shares of bad pixels.
+"""Errors of a depth map: those of the paper, and shares of bad pixels.
 
 Paper, section "Evaluation": mean absolute error, root mean square error and median
-absolute error; residuals beyond a limit (10 m on ETH3D) are discarded first.
+absolute error, after residuals beyond a limit (10 m on ETH3D) have been discarded.
 """
 
 import dataclasses
 import math
+from typing import NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -16,15 +17,39 @@ from resdepth_colmap.scene import DepthMap
 _ROWS_AT_ONCE = 128
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class DepthMetrics:
-    """Errors of one depth map over the pixels whose true depth is known.
+class Residuals(NamedTuple):
+    """Absolute errors of the pixels with a true depth, each of shape (N,).
 
     Attributes:
-        num_pixels: Pixels with a true depth, in the region.
-        num_valid: Those of them that the errors are taken of.
-        num_missing: Those of them that have no depth.
-        num_discarded: Those of them whose residual is beyond the limit.
+        truth: True depth, float64, in units.
+        errors: In units, float64; infinite without a depth.
+        is_valid: Which errors are finite and within the limit.
+    """
+
+    truth: npt.NDArray[np.float64]
+    errors: npt.NDArray[np.float64]
+    is_valid: npt.NDArray[np.bool_]
+
+    @property
+    def valid(self) -> npt.NDArray[np.float64]:
+        """The valid errors, shape (M,)."""
+        return self.errors[self.is_valid]
+
+    def bad_share(self, limits: npt.NDArray[np.float64] | float) -> float:
+        """Share of invalid pixels and of errors beyond limits in units; NaN of none."""
+        is_bad = ~self.is_valid | (self.errors > limits)
+        return float(is_bad.mean()) if is_bad.size else math.nan
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class DepthMetrics:
+    """Errors of one depth map over the pixels with a true depth.
+
+    Attributes:
+        num_pixels: Number of pixels with a true depth, in the region.
+        num_valid: Number of those that the errors are computed from.
+        num_missing: Number of those without a depth.
+        num_discarded: Number of those whose residual is beyond the limit.
         mae: Mean absolute error, in workspace units; NaN without valid pixels.
         rmse: Root mean square error, in workspace units; likewise.
         medae: Median absolute error, in workspace units; likewise.
@@ -49,8 +74,28 @@ class DepthMetrics:
     bad_2cm: float
     bad_5cm: float
 
+    @classmethod
+    def of(cls, residuals: Residuals) -> Self:
+        """The errors, each computed from all residuals."""
+        truth, errors, is_valid = residuals
+        valid = residuals.valid
+        return cls(
+            num_pixels=errors.size,
+            num_valid=valid.size,
+            num_missing=int(np.isinf(errors).sum()),
+            num_discarded=int((np.isfinite(errors) & ~is_valid).sum()),
+            mae=float(valid.mean()) if valid.size else math.nan,
+            rmse=float(np.sqrt(np.mean(valid**2))) if valid.size else math.nan,
+            medae=float(np.median(valid)) if valid.size else math.nan,
+            bad_1=residuals.bad_share(0.01 * truth),
+            bad_2=residuals.bad_share(0.02 * truth),
+            bad_1cm=residuals.bad_share(0.01),
+            bad_2cm=residuals.bad_share(0.02),
+            bad_5cm=residuals.bad_share(0.05),
+        )
+
     def to_mapping(self) -> dict[str, float | int | None]:
-        """Plain values, ready for JSON: NaN becomes None."""
+        """Plain values, ready for JSON; NaN becomes None."""
         values = dataclasses.asdict(self)
         return {key: None if math.isnan(v) else v for key, v in values.items()}
 
@@ -61,14 +106,24 @@ def depth_metrics(
     region: npt.NDArray[np.bool_] | None = None,
     max_residual: float | None = PAPER_MAX_RESIDUAL,
 ) -> DepthMetrics:
-    """Compare a depth map with the truth.
+    """The errors of a depth map; see `find_residuals`."""
+    return DepthMetrics.of(find_residuals(depth, truth, region, max_residual))
+
+
+def find_residuals(
+    depth: DepthMap,
+    truth: DepthMap,
+    region: npt.NDArray[np.bool_] | None = None,
+    max_residual: float | None = PAPER_MAX_RESIDUAL,
+) -> Residuals:
+    """Compare a depth map with the ground truth.
 
     Args:
         depth: Shape (H, W), in workspace units; 0 = no depth.
-        truth: True depth, same shape; 0 = not known, which is not counted.
+        truth: True depth, same shape; 0 = unknown, which does not count.
         region: Where to compare, same shape; None = everywhere.
-        max_residual: Absolute errors beyond it, in workspace units, are discarded from
-            mean, RMS and median; None = none is.
+        max_residual: Absolute errors beyond it, in workspace units, are invalid; None =
+            no limit.
 
     Raises:
         ValueError: If the shapes differ.
@@ -82,29 +137,17 @@ def depth_metrics(
     true_depth = truth[known].astype(np.float64)
     estimate = depth[known].astype(np.float64)
     present = np.isfinite(estimate) & (estimate > 0)
-    residual = np.abs(np.where(present, estimate, np.inf) - true_depth)
+    errors = np.abs(np.where(present, estimate, np.inf) - true_depth)
     limit = math.inf if max_residual is None else max_residual
-    kept = present & (residual <= limit)
-    return DepthMetrics(
-        num_pixels=true_depth.size,
-        num_valid=int(kept.sum()),
-        num_missing=int((~present).sum()),
-        num_discarded=int((present & ~kept).sum()),
-        **_errors(residual[kept]),
-        bad_1=_share(~kept | (residual > 0.01 * true_depth)),
-        bad_2=_share(~kept | (residual > 0.02 * true_depth)),
-        bad_1cm=_share(~kept | (residual > 0.01)),
-        bad_2cm=_share(~kept | (residual > 0.02)),
-        bad_5cm=_share(~kept | (residual > 0.05)),
-    )
+    return Residuals(true_depth, errors, present & (errors <= limit))
 
 
 def median_filtered(depth: DepthMap, size: int = 5) -> DepthMap:
-    """The paper's baseline: each depth becomes the median of its square window.
+    """The baseline of the paper: the median of the square window of each pixel.
 
-    Holes stay holes and are left out of the windows, as is what lies outside the map.
-    Of an even number of values the lower middle one is taken, so that each result is
-    the depth of some pixel and never a mean across an edge.
+    Holes stay holes; windows leave out holes and what lies outside of the map. The
+    median of an even number of values is the lower of the middle two, so it is always
+    the depth of a pixel and never a mean across an edge.
 
     Args:
         depth: Shape (H, W), in workspace units; 0 = no depth.
@@ -131,17 +174,3 @@ def _lower_median(padded: DepthMap, size: int) -> DepthMap:
     middle = np.maximum(np.isfinite(values).sum(axis=2) - 1, 0) // 2
     median: DepthMap = np.take_along_axis(values, middle[..., np.newaxis], axis=2)
     return median[..., 0]
-
-
-def _errors(residual: npt.NDArray[np.float64]) -> dict[str, float]:
-    if not residual.size:
-        return {"mae": math.nan, "rmse": math.nan, "medae": math.nan}
-    return {
-        "mae": float(residual.mean()),
-        "rmse": float(np.sqrt(np.mean(residual**2))),
-        "medae": float(np.median(residual)),
-    }
-
-
-def _share(is_bad: npt.NDArray[np.bool_]) -> float:
-    return float(is_bad.mean()) if is_bad.size else math.nan

@@ -1,4 +1,4 @@
-"""Parts of a true depth map that are hard and easy: edges and flat areas."""
+"""Edges and flat areas of a ground-truth depth map."""
 
 import numpy as np
 import numpy.typing as npt
@@ -8,20 +8,20 @@ from resdepth_colmap.scene import DepthMap
 
 EDGE_RADIUS_PX = 4
 EDGE_RATIO = 1.1
-"""Near an edge the true depths differ by more than that factor."""
+"""Least ratio of true depths across an edge."""
 
 
 def edge_region(truth: DepthMap) -> npt.NDArray[np.bool_]:
-    """Where the true depth jumps: 10 % within a square of 9 x 9 pixels.
+    """Pixels near a depth discontinuity: a ratio of 1.1 within 9 x 9 pixels.
 
-    A floor seen at a grazing angle changes by 1 % a pixel, so it is no edge. Laser
-    scans have holes along the edges; the square reaches across them.
+    A floor at a grazing angle changes by 1 % per pixel, so it is no edge. Laser scans
+    have holes along edges; the window reaches across them.
 
     Args:
-        truth: True depth, shape (H, W), in units; 0 = not known.
+        truth: True depth, shape (H, W), in units; 0 = unknown.
 
     Returns:
-        Shape (H, W), bool; False where the truth is not known.
+        Shape (H, W), bool; False where the truth is unknown.
     """
     known = truth > 0
     size = 2 * EDGE_RADIUS_PX + 1

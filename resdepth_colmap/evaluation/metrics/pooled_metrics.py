@@ -1,7 +1,7 @@
-"""Errors pooled over all pixels of several depth maps, as the paper's table does.
+"""Errors pooled over all pixels of several depth maps, as in the table of the paper.
 
-Means, squares and shares of the maps add up; the median is read off a histogram of all
-residuals, so that memory does not grow with the number of maps.
+Means, squares and shares are weighted means of those of the maps. The median comes from
+a histogram of all residuals, so memory does not grow with the number of maps.
 """
 
 import dataclasses
@@ -13,25 +13,30 @@ import numpy as np
 import numpy.typing as npt
 
 from resdepth_colmap.evaluation.datasets.paper import PAPER_MAX_RESIDUAL
-from resdepth_colmap.evaluation.metrics.depth_metrics import DepthMetrics, depth_metrics
+from resdepth_colmap.evaluation.metrics.depth_metrics import (
+    DepthMetrics,
+    find_residuals,
+)
 from resdepth_colmap.scene import DepthMap
 
 SMALLEST = 1e-9
-"""Residuals below it, in workspace units, fall into the first bin."""
+"""Smaller residuals, in workspace units, fall into the first bin."""
 
 _BINS_A_DECADE = 500
 _NUM_DECADES = 15
 _NUM_BINS = _BINS_A_DECADE * _NUM_DECADES
+_COUNTS = ("num_pixels", "num_valid", "num_missing", "num_discarded")
 _SHARES = ("bad_1", "bad_2", "bad_1cm", "bad_2cm", "bad_5cm")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
-class ErrorSample:
-    """Errors of one map or of many, which can be pooled.
+class PooledErrors:
+    """Errors of one or several depth maps, which can be pooled further.
 
     Attributes:
         metrics: The errors.
-        histogram: Number of valid residuals by size, logarithmic, shape (7500,).
+        histogram: Number of valid residuals by size, in logarithmic bins, shape
+            (7500,).
     """
 
     metrics: DepthMetrics
@@ -45,62 +50,48 @@ class ErrorSample:
         region: npt.NDArray[np.bool_] | None = None,
         max_residual: float | None = PAPER_MAX_RESIDUAL,
     ) -> Self:
-        """Measure one map; arguments and errors are those of `depth_metrics`."""
-        metrics = depth_metrics(depth, truth, region, max_residual)
-        valid = (truth > 0) & (depth > 0) & np.isfinite(depth)
-        if region is not None:
-            valid &= region
-        residual = np.abs(depth[valid].astype(np.float64) - truth[valid])
-        if max_residual is not None:
-            residual = residual[residual <= max_residual]
-        return cls(metrics=metrics, histogram=_histogram(residual))
+        """The errors of one map; arguments as in `find_residuals`."""
+        residuals = find_residuals(depth, truth, region, max_residual)
+        return cls(
+            metrics=DepthMetrics.of(residuals), histogram=_histogram(residuals.valid)
+        )
 
 
-def pooled(samples: Sequence[ErrorSample]) -> ErrorSample:
-    """The errors over all pixels of all maps; exact but for the median of several.
+def pooled(parts: Sequence[PooledErrors]) -> PooledErrors:
+    """The errors over all pixels of all maps.
 
     Args:
-        samples: At least one.
+        parts: At least one.
 
     Returns:
-        A single sample as it is; of several the median is right to half a per cent.
+        Exact values, except for the median of several parts: right to half a per cent.
     """
-    if len(samples) == 1:
-        return samples[0]
-    metrics = [sample.metrics for sample in samples]
-    valid = [m.num_valid for m in metrics]
-    square = _mean([m.rmse**2 for m in metrics], valid)
-    pixels = [m.num_pixels for m in metrics]
-    shares = {n: _mean([getattr(m, n) for m in metrics], pixels) for n in _SHARES}
-    histogram: npt.NDArray[np.uint32] = np.zeros(_NUM_BINS, np.uint32)
-    for sample in samples:
-        histogram += sample.histogram
-    return ErrorSample(
-        metrics=DepthMetrics(
-            num_pixels=sum(pixels),
-            num_valid=sum(valid),
-            num_missing=sum(m.num_missing for m in metrics),
-            num_discarded=sum(m.num_discarded for m in metrics),
-            mae=_mean([m.mae for m in metrics], valid),
-            rmse=math.sqrt(square),
-            medae=_median(histogram),
-            **shares,
-        ),
-        histogram=histogram,
+    if len(parts) == 1:
+        return parts[0]
+    metrics = [part.metrics for part in parts]
+    histogram = np.stack([part.histogram for part in parts]).sum(0, dtype=np.uint32)
+
+    def total(name: str) -> int:
+        return sum(getattr(it, name) for it in metrics)
+
+    def mean(name: str, weight: str, power: int = 1) -> float:
+        """Weighted mean; NaN without any weight."""
+        pairs = [(getattr(it, name), getattr(it, weight)) for it in metrics]
+        weighted = [value**power * number for value, number in pairs if number]
+        return sum(weighted) / total(weight) if weighted else math.nan
+
+    pooled_metrics = DepthMetrics(
+        **{name: total(name) for name in _COUNTS},
+        mae=mean("mae", "num_valid"),
+        rmse=math.sqrt(mean("rmse", "num_valid", power=2)),
+        medae=_median(histogram),
+        **{name: mean(name, "num_pixels") for name in _SHARES},
     )
+    return PooledErrors(metrics=pooled_metrics, histogram=histogram)
 
 
-def _mean(values: Sequence[float], weights: Sequence[int]) -> float:
-    """Weighted mean; what has no weight may be NaN, and all of it gives NaN."""
-    total = sum(weights)
-    if not total:
-        return math.nan
-    weighted = (v * w for v, w in zip(values, weights, strict=True) if w)
-    return sum(weighted) / total
-
-
-def _histogram(residual: npt.NDArray[np.float64]) -> npt.NDArray[np.uint32]:
-    position = np.log10(np.maximum(residual, SMALLEST) / SMALLEST) * _BINS_A_DECADE
+def _histogram(residuals: npt.NDArray[np.float64]) -> npt.NDArray[np.uint32]:
+    position = np.log10(np.maximum(residuals, SMALLEST) / SMALLEST) * _BINS_A_DECADE
     bins = np.clip(position.astype(np.int64), 0, _NUM_BINS - 1)
     return np.bincount(bins, minlength=_NUM_BINS).astype(np.uint32)
 

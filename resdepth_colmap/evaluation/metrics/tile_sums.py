@@ -1,7 +1,7 @@
-"""What was measured at the pixels of a view, summed over square tiles."""
+"""Values at the pixels of a view, summed over square tiles."""
 
 import dataclasses
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -13,11 +13,11 @@ TILE_PX = 64
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class TileSums:
-    """Sums over the tiles of a view, from which means follow.
+    """Sums over the tiles of a view, and the means of these.
 
     Attributes:
-        sums: Of the values, shape (T,).
-        counts: How many values each tile has, shape (T,).
+        sums: Sum of the values of each tile, shape (T,).
+        counts: Number of values of each tile, shape (T,).
     """
 
     sums: Matrix
@@ -25,28 +25,42 @@ class TileSums:
 
     @classmethod
     def of(cls, sums: npt.ArrayLike, counts: npt.ArrayLike) -> Self:
-        """Sum maps over tiles of 64 pixels; those at the far borders are smaller.
+        """Sum maps over tiles of 64 x 64 pixels; those at the far borders are smaller.
 
         Args:
             sums: Sum of the values at each pixel, shape (H, W).
-            counts: Number of the values at each pixel, shape (H, W); where it is 0,
-                the sum is not looked at.
+            counts: Number of values at each pixel, shape (H, W); where it is 0, the
+                sum is ignored.
         """
-        number = np.asarray(counts, np.float64)
-        values = np.where(number > 0, np.asarray(sums, np.float64), 0.0)
-        return cls(sums=_tiled(values), counts=_tiled(number))
+        num_values = np.asarray(counts, np.float64)
+        values = np.where(num_values > 0, np.asarray(sums, np.float64), 0.0)
+        return cls(sums=_tiled(values), counts=_tiled(num_values))
 
     @property
     def mean(self) -> float:
-        """Mean of the values of all tiles; NaN without any."""
+        """Mean of all values; NaN without any."""
         total = self.counts.sum()
         return float(self.sums.sum() / total) if total else float("nan")
 
     @property
     def means(self) -> Matrix:
-        """Mean of each tile, shape (T,); NaN where a tile has no value."""
+        """Mean of each tile, shape (T,); NaN in a tile without values."""
         known = self.counts > 0
         return np.where(known, self.sums / np.where(known, self.counts, 1), np.nan)
+
+
+def with_common(name: str, totals: npt.NDArray[Any]) -> dict[str, TileSums]:
+    """A measure over the pixels of a method, and over those of all methods.
+
+    Args:
+        name: Of the measure.
+        totals: Sum and number of the values at each pixel, then both at the pixels that
+            every method covers, shape (4, H, W).
+    """
+    return {
+        name: TileSums.of(totals[0], totals[1]),
+        f"{name}_common": TileSums.of(totals[2], totals[3]),
+    }
 
 
 def _tiled(values: Matrix) -> Matrix:

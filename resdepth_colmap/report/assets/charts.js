@@ -90,7 +90,7 @@ function drawHistograms(image, maps) {
   drawChanges(image, maps);
 }
 
-// What was kept would be one column that dwarfs all others: it is said in words.
+// The unchanged pixels would be one column that dwarfs all others, so a text counts them.
 function drawChanges(image, maps) {
   const changed = [];
   let numBoth = 0;

@@ -89,7 +89,7 @@ function drawColorBar(canvas, name) {
   context.putImageData(picture, 0, 0);
 }
 
-// What the colours mean: [place in 0..1, text] and a sentence.
+// The meaning of the colours: [position in 0..1, text] and a sentence.
 function legendOf(mode, image) {
   if (mode === "difference") {
     const limit = brief(100 * image.limit);
@@ -103,7 +103,7 @@ function legendOf(mode, image) {
     return {
       colors: "confidence",
       ticks: [[0, "0"], [0.5, "0.5"], [1, "1"]],
-      text: "Confidence: the network's chance that the refined depth is within 1 %.",
+      text: "Confidence: estimated probability that the refined depth is within 1 % of the truth.",
     };
   }
   if (mode === "error") {

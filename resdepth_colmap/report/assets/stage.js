@@ -101,7 +101,7 @@ function showImageFacts(image) {
     ["Refined from", image.input],
     ["Covered", `${percent(before)} → ${percent(after)}`],
     ["Median change", image.change === null ? NOT_KNOWN : percent(image.change, 2)],
-    ...image.sources.flatMap(({ name, reason }) => [["Second view", reason ? `${name} (${reason})` : name]]),
+    ...image.sources.flatMap(({ name, reason }) => [["Source view", reason ? `${name} (${reason})` : name]]),
     ["Time", duration(image.seconds)],
   ];
   if (image.mapWidth < image.width) rows.splice(1, 0, ["Shown at", `${image.mapWidth} × ${image.mapHeight} px`]);

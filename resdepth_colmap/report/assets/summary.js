@@ -59,12 +59,12 @@ function coverageCard({ coverage: [before, after] }) {
   return card("Coverage", percent(before), percent(after), "Share of the pixels that have a depth.", [before, after]);
 }
 
-function agreementCard({ agreement: [before, after], confirmed, num_views_needed: needed }) {
+function agreementCard({ agreement: [before, after], consistent, num_views_needed: needed }) {
   if (after === null) return null;
   const views = needed ? `${needed} views` : "the views";
-  const all = confirmed[0] === null ? percent(confirmed[1]) : `${percent(confirmed[0])} → ${percent(confirmed[1])}`;
-  const text = `Depths that ${views} agree on, of all depths; ${all} of all pixels.`;
-  return card("Agreement across views", before === null ? null : percent(before), percent(after), text, [before, after]);
+  const all = consistent[0] === null ? percent(consistent[1]) : `${percent(consistent[0])} → ${percent(consistent[1])}`;
+  const text = `Share of the depths that are consistent in ${views}; ${all} of all pixels.`;
+  return card("Consistency across views", before === null ? null : percent(before), percent(after), text, [before, after]);
 }
 
 function pointsCard({ points: [before, after] }) {
@@ -116,8 +116,8 @@ function showNotes(facts) {
     say(`${count(report.images.length)} of ${count(facts.num_images)} images are shown here, evenly chosen; the numbers above are of all.`);
   }
   for (const { reason, names } of report.leftOut) say(`${names.join(", ")}: not shown. ${reason}`);
-  for (const { reason, number } of report.skipped) {
-    say(`${count(number)} ${number === 1 ? "image was" : "images were"} not refined: ${reason} (see Details).`);
+  for (const { reason, count: total } of report.skipped) {
+    say(`${count(total)} ${total === 1 ? "image was" : "images were"} not refined: ${reason} (see Details).`);
   }
 }
 
@@ -137,8 +137,8 @@ function showDetails(facts) {
       detailColumn("Versions", Object.entries(facts.versions).map(([k, v]) => [k, flat(v)])),
     ]),
   );
-  for (const { reason, number, names } of report.skipped) {
-    const more = number > names.length ? [`and ${count(number - names.length)} more`] : [];
+  for (const { reason, count: total, names } of report.skipped) {
+    const more = total > names.length ? [`and ${count(total - names.length)} more`] : [];
     const items = [...names, ...more].map((name) => make("li", { textContent: name }));
     list.append(detail(`Not refined: ${reason}`, [make("ul", {}, ...items)]));
   }

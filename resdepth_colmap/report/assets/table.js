@@ -4,7 +4,7 @@ const COLUMNS = [
   { title: "Image", value: (image) => image.name },
   { title: "Covered", value: (image) => image.filled[1], cell: (image) => coverage(image.filled) },
   { title: "Median change", value: (image) => image.change, cell: (image) => percent(image.change, 2) },
-  { title: "Second view", value: (image) => image.sources[0]?.name ?? NOT_KNOWN },
+  { title: "Source view", value: (image) => image.sources[0]?.name ?? NOT_KNOWN },
   { title: "Time", value: (image) => image.seconds, cell: (image) => duration(image.seconds) },
   errorColumn("Mean error", "mae", length),
   errorColumn("RMS error", "rmse", length),

@@ -10,7 +10,7 @@ import numpy as np
 
 from resdepth_colmap.config import FuseConfig, StereoConfig
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.evaluation.cloud.reference_cloud import read_depth_truth
+from resdepth_colmap.evaluation.cloud.reference_cloud import read_reference_cloud
 from resdepth_colmap.evaluation.datasets.workspaces import SEEN_SUFFIX, TRUTH_FOLDER
 from resdepth_colmap.evaluation.metrics.depth_metrics import depth_metrics
 from resdepth_colmap.io.colmap.cfg import SourceKind, SourceSpec
@@ -154,7 +154,7 @@ def fused_scores(filtered: MatchedWorkspace) -> Result:
         )
         for view in filtered.scene.views
     ]
-    truth = read_depth_truth(workspace, filtered.scene, ())
+    truth = read_reference_cloud(workspace, filtered.scene, ())
     if truth is None:
         raise WorkspaceError(f"{workspace.path}: no {TRUTH_FOLDER}/ in it.")
     result: Result = {"true_points": len(truth.points)}

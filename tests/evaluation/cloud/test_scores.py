@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from resdepth_colmap.errors import ConfigError
 from resdepth_colmap.evaluation.cloud import beams, completeness
 from resdepth_colmap.evaluation.cloud.config import CloudConfig
-from resdepth_colmap.evaluation.cloud.files import score_cloud_file
+from resdepth_colmap.evaluation.cloud.laser_truth import score_cloud_file
 from resdepth_colmap.evaluation.cloud.scores import (
     CloudScores,
     PlacedScan,

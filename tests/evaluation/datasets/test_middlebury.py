@@ -102,7 +102,7 @@ def half_an_image(folder: Path) -> None:
         (colour_truth, r"disp0\.pfm: no grey PFM file"),
         (without_truth, r"no disp0\.pfm or disp0GT\.pfm"),
         (without_baseline, r"calib\.txt: no baseline with 1 numbers"),
-        (no_number, r"calib\.txt, line 3: 'three' is no number"),
+        (no_number, r"calib\.txt, line 3: 'three' is not a number"),
         (half_an_image, r"differ in size \(im0\.png 40 x 30, disp0\.pfm 80 x 60"),
     ],
 )

@@ -115,7 +115,7 @@ def without_image(folder: Path) -> None:
     ("break_it", "words"),
     [
         (without_truth, r"ground_truth: no map .* im0\.png would be im0\.png\.bin"),
-        (without_folder, "Plane: no ground_truth/ in it"),
+        (without_folder, "Plane: no ground_truth/,"),
         (with_small_truth, r"im0\.png\.bin: 8 x 6 pixels, but its image has 80 x 60"),
         (with_small_map, r"photometric\.bin: 40 x 30 pixels, but its image"),
         (with_empty_map, r"photometric\.bin: no pixel has a depth"),

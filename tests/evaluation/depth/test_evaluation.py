@@ -22,7 +22,6 @@ from resdepth_colmap.evaluation.datasets.scenes import scene_sources
 from resdepth_colmap.evaluation.depth import sample_matching as sample_matching
 from resdepth_colmap.evaluation.depth.evaluation import (
     EvaluationOptions,
-    Listener,
     evaluate_scenes,
 )
 from resdepth_colmap.evaluation.depth.match_cache import MatchCache
@@ -139,7 +138,7 @@ def test_a_perfect_start_has_no_ratio(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scene = result_of(tmp_path, monkeypatch, write_stereo_pair(tmp_path / "Plane"))
-    assert math.isnan(scene.mae_ratio)
+    assert math.isnan(scene.ratio("mae"))
     assert scene.to_mapping()["mae_ratio"] is None
 
 
@@ -166,7 +165,7 @@ def test_a_broken_scene_stops_no_other(tmp_path: Path) -> None:
     report = evaluate_scenes(
         scene_sources([tmp_path / "scenes"]),
         options(tmp_path),
-        Listener(on_failure=lambda name, reason: failures.append((name, reason))),
+        lambda name, reason: failures.append((name, reason)),
     )
     assert [scene.name for scene in report.scenes] == ["A", "B"]
     assert dict(report.failed) == dict(failures)

@@ -1,4 +1,4 @@
-"""Laws of refining a case: its sources are refined first, as in a workspace."""
+"""Laws of refining a sample: its sources are refined first, as in a workspace."""
 
 import dataclasses
 from collections.abc import Callable

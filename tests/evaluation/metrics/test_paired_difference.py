@@ -14,7 +14,7 @@ Array = npt.NDArray[np.float64]
 
 
 @given(VALUES)
-def test_an_arm_does_not_differ_from_itself(values: Array) -> None:
+def test_a_method_does_not_differ_from_itself(values: Array) -> None:
     found = paired_difference(values, values)
     assert found.mean == found.median == 0
     assert found.interval == (0.0, 0.0)
@@ -22,7 +22,7 @@ def test_an_arm_does_not_differ_from_itself(values: Array) -> None:
 
 
 @given(VALUES, VALUES)
-def test_exchanged_arms_exchange_better_and_worse(first: Array, second: Array) -> None:
+def test_swapped_methods_swap_better_and_worse(first: Array, second: Array) -> None:
     there, back = paired_difference(first, second), paired_difference(second, first)
     assert there.mean is not None
     assert back.mean is not None

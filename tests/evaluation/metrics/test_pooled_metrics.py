@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from resdepth_colmap.evaluation.metrics.depth_metrics import depth_metrics
-from resdepth_colmap.evaluation.metrics.pooled_metrics import ErrorSample, pooled
+from resdepth_colmap.evaluation.metrics.pooled_metrics import PooledErrors, pooled
 from resdepth_colmap.scene import DepthMap
 
 
@@ -26,7 +26,7 @@ def test_pooling_is_measuring_all_pixels_at_once(seed: int, scale: float) -> Non
     pairs = [maps(seed + i, scale * (1 + i)) for i in range(3)]
     depth, truth = (np.concatenate(part) for part in zip(*pairs, strict=True))
     whole = depth_metrics(depth, truth)
-    together = pooled([ErrorSample.of(*pair) for pair in pairs]).metrics.to_mapping()
+    together = pooled([PooledErrors.of(*pair) for pair in pairs]).metrics.to_mapping()
     for name, value in whole.to_mapping().items():
         # The median is read off a histogram whose bins are half a per cent wide.
         tolerance = 0.02 if name == "medae" else 1e-6
@@ -35,14 +35,14 @@ def test_pooling_is_measuring_all_pixels_at_once(seed: int, scale: float) -> Non
 
 def test_a_single_map_is_measured_exactly() -> None:
     depth, truth = maps(0, 0.1)
-    sample = pooled([ErrorSample.of(depth, truth)])
+    sample = pooled([PooledErrors.of(depth, truth)])
     assert sample.metrics == depth_metrics(depth, truth)
 
 
 def test_a_map_without_truth_changes_nothing() -> None:
     depth, truth = maps(0, 0.1)
-    sample = ErrorSample.of(depth, truth)
-    empty = ErrorSample.of(depth, np.zeros_like(truth))
+    sample = PooledErrors.of(depth, truth)
+    empty = PooledErrors.of(depth, np.zeros_like(truth))
     both = pooled([sample, empty]).metrics
     assert both.mae == pytest.approx(sample.metrics.mae)
     assert both.bad_5cm == pytest.approx(sample.metrics.bad_5cm)
@@ -52,5 +52,5 @@ def test_a_map_without_truth_changes_nothing() -> None:
 
 def test_exact_maps_have_a_median_error_of_next_to_nothing() -> None:
     _, truth = maps(0, 0.1)
-    sample = ErrorSample.of(truth, truth)
+    sample = PooledErrors.of(truth, truth)
     assert pooled([sample, sample]).metrics.medae < 1e-8
