@@ -7,6 +7,7 @@ a neighbouring photograph, warped by the map, has to look like the view's own.
 
 import logging
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -100,7 +101,10 @@ def fit_to_points(depth: DepthMap, view: View, xyz: Matrix) -> ScaleFit | None:
 
 
 def initial_scales(
-    workspace: Workspace, scene: Scene, maps: Mapping[int, InitialMap]
+    workspace: Workspace,
+    scene: Scene,
+    maps: Mapping[int, InitialMap],
+    read_map: Callable[[Path], DepthMap] = read_depth_map,
 ) -> dict[int, ScaleFit]:
     """The scale of each map that is not blank, by the index of its view.
 
@@ -111,6 +115,7 @@ def initial_scales(
         workspace: With sparse points and photographs.
         scene: Its views.
         maps: Initial maps by view.
+        read_map: Reads a depth map.
 
     Raises:
         WorkspaceError: If a file cannot be read.
@@ -118,7 +123,7 @@ def initial_scales(
     filled = {index: found for index, found in maps.items() if found.filled}
 
     def read(index: int) -> DepthMap:
-        return read_depth_map(filled[index].path)
+        return read_map(filled[index].path)
 
     if scene.num_shared_points is None:
         fit = _fit_to_photographs(workspace, scene, sorted(filled), read)

@@ -144,7 +144,7 @@ def test_info_is_a_table_or_json(tmp_path: Path) -> None:
 def test_the_log_is_not_on_stdout(tmp_path: Path) -> None:
     folder = plane_folder(tmp_path)
     (folder / f"stereo/depth_maps/{NAMES[0]}.geometric.bin").unlink()
-    result = refine(folder, "--no-fuse", "--no-pictures")
+    result = refine(folder, "--stereo", "existing", "--no-fuse", "--no-pictures")
     assert "1 skipped, no depth map" in result.stderr
     assert "skipped, no depth map" not in result.stdout
 
@@ -154,6 +154,7 @@ def test_quiet_stands_before_or_after_the_command(tmp_path: Path) -> None:
     (folder / f"stereo/depth_maps/{NAMES[0]}.geometric.bin").unlink()
     weights = identity_weights(tmp_path)
     rest = (folder, "--weights", weights, "--no-fuse", "--no-pictures", "--overwrite")
+    rest = (*rest, "--stereo", "existing")
     assert run("refine", *rest).stderr
     assert run("-qq", "refine", *rest).stderr == ""
     assert run("refine", *rest, "-qq").stderr == ""

@@ -42,7 +42,11 @@ def opened() -> Iterator[collections.Counter[str]]:
 def num_map_reads(opened: collections.Counter[str]) -> int:
     folders = ("depth_maps", "outer_iterations")
     maps = (path for path in opened if any(folder in path for folder in folders))
-    return sum(opened[path] for path in maps if ".partial-" not in path)
+    return sum(
+        opened[path]
+        for path in maps
+        if path.endswith(".bin") and ".partial-" not in path
+    )
 
 
 def config(folder: Path) -> RefineConfig:

@@ -7,7 +7,7 @@ a histogram of all residuals, so memory does not grow with the number of maps.
 import dataclasses
 import math
 from collections.abc import Sequence
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -80,12 +80,13 @@ def pooled(parts: Sequence[PooledErrors]) -> PooledErrors:
         weighted = [value**power * number for value, number in pairs if number]
         return sum(weighted) / total(weight) if weighted else math.nan
 
+    shares: dict[str, Any] = {name: mean(name, "num_pixels") for name in _SHARES}
     pooled_metrics = DepthMetrics(
         **{name: total(name) for name in _COUNTS},
         mae=mean("mae", "num_valid"),
         rmse=math.sqrt(mean("rmse", "num_valid", power=2)),
         medae=_median(histogram),
-        **{name: mean(name, "num_pixels") for name in _SHARES},
+        **shares,
     )
     return PooledErrors(metrics=pooled_metrics, histogram=histogram)
 

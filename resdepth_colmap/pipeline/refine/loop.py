@@ -76,7 +76,9 @@ class RefineLoop:
         pending = [t for t in last if overwrite or not self._manifest.is_fresh(t)]
         if pending and not self._config.fit_scale:
             maps = {task.index: task.initial for task in last}
-            fits = initial_scales(self._output.source, self._scene, maps)
+            fits = initial_scales(
+                self._output.source, self._scene, maps, self._images.whole_map
+            )
             check_scales(self._scene, maps, fits)
         if overwrite:
             self._forget_earlier(plan)
