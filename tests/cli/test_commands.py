@@ -153,8 +153,16 @@ def test_quiet_stands_before_or_after_the_command(tmp_path: Path) -> None:
     folder = plane_folder(tmp_path)
     (folder / f"stereo/depth_maps/{NAMES[0]}.geometric.bin").unlink()
     weights = identity_weights(tmp_path)
-    rest = (folder, "--weights", weights, "--no-fuse", "--no-pictures", "--overwrite")
-    rest = (*rest, "--stereo", "existing")
+    rest = (
+        folder,
+        "--weights",
+        weights,
+        "--no-fuse",
+        "--no-pictures",
+        "--overwrite",
+        "--stereo",
+        "existing",
+    )
     assert run("refine", *rest).stderr
     assert run("-qq", "refine", *rest).stderr == ""
     assert run("refine", *rest, "-qq").stderr == ""
