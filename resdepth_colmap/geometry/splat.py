@@ -3,12 +3,9 @@
 from collections.abc import Iterable
 
 import numpy as np
-import numpy.typing as npt
 
-from resdepth_colmap.geometry.projection import project
+from resdepth_colmap.geometry.projection import Indices, look_up, pixel_xy, project
 from resdepth_colmap.scene import DepthMap, FloatMap, Matrix
-
-Indices = npt.NDArray[np.int64]
 
 FRONT_LAYER = 1.02
 """Points up to that factor behind the nearest one of their pixel are its surface."""
@@ -53,13 +50,8 @@ def _hits(
     xyz: Matrix, K: Matrix, height_px: int, width_px: int
 ) -> tuple[Indices, FloatMap, FloatMap]:
     """Of each point in the map: flat pixel index, depth, squared offset."""
-    usable = np.isfinite(xyz).all(axis=-1) & (xyz[:, 2] > 0)
-    xy, z = project(xyz[usable], K)
-    in_reach = (np.abs(xy) < 1e9).all(axis=-1)  # an integer has to hold it
-    xy, z = xy[in_reach], z[in_reach]
-    rounded = np.rint(xy).astype(np.int64)
-    column, row = rounded[:, 0], rounded[:, 1]
-    inside = (column >= 0) & (column < width_px) & (row >= 0) & (row < height_px)
-    pixels = row[inside] * width_px + column[inside]
-    offset = ((xy[inside] - rounded[inside]) ** 2).sum(axis=-1)
-    return pixels, z[inside].astype(np.float32), offset.astype(np.float32)
+    xyz = xyz[np.isfinite(xyz).all(axis=-1)]
+    seen, pixels = look_up(xyz, K, (height_px, width_px))
+    xy, z = project(xyz[seen], K)
+    offset = ((xy - pixel_xy(pixels, width_px)) ** 2).sum(axis=-1)
+    return pixels, z.astype(np.float32), offset.astype(np.float32)

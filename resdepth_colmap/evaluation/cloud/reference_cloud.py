@@ -18,7 +18,7 @@ from resdepth_colmap.evaluation.cloud.scores import CloudScores
 from resdepth_colmap.evaluation.cloud.voxel_mean import VoxelGrids
 from resdepth_colmap.evaluation.datasets.workspaces import TRUTH_FOLDER
 from resdepth_colmap.geometry.pixels import index_K
-from resdepth_colmap.geometry.projection import back_project, project, transform
+from resdepth_colmap.geometry.projection import back_project, look_up, transform
 from resdepth_colmap.io.colmap.depth_map import read_depth_map
 from resdepth_colmap.io.colmap.workspace import Workspace
 from resdepth_colmap.pipeline.initial_map import check_map_size
@@ -115,13 +115,8 @@ class ReferenceCloud:
             rest = np.flatnonzero(~found)
             world = points[rest].astype(np.float64)
             xyz = transform(truth_map.view.cam_from_world, world)
-            xy, z = project(xyz, truth_map.K)
-            height_px, width_px = truth_map.depth.shape
-            column, row = np.rint(xy.clip(-1e6, 1e6)).astype(np.int64).T
-            inside = (z > 0) & (column >= 0) & (row >= 0)
-            inside &= (column < width_px) & (row < height_px)
-            pixels = row[inside], column[inside]
-            found[rest[inside]] = truth_map.depth[pixels] > 0
+            seen, pixels = look_up(xyz, truth_map.K, truth_map.depth.shape)
+            found[rest[seen]] = truth_map.depth.ravel()[pixels] > 0
         return found
 
 

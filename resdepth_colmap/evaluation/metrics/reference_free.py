@@ -13,9 +13,9 @@ import numpy.typing as npt
 
 from resdepth_colmap.evaluation.metrics.tile_sums import TileSums, with_common
 from resdepth_colmap.evaluation.metrics.view_maps import ViewMaps
-from resdepth_colmap.geometry.projection import pixel_rays, project, transform
+from resdepth_colmap.geometry.projection import lift, look_up, transform
 from resdepth_colmap.io.colmap.sparse_points import SparsePoints
-from resdepth_colmap.scene import DepthMap, Matrix, cam_from_cam
+from resdepth_colmap.scene import DepthMap, cam_from_cam
 
 Flags = npt.NDArray[np.bool_]
 Sums = dict[str, TileSums]
@@ -66,7 +66,9 @@ def sparse_points(maps: ViewMaps, points: SparsePoints) -> dict[str, Sums]:
     indices = points.seen_by(maps.view.image_id)
     if not indices.size:
         return {}
-    pixels, z, inside = _pixels(points.xyz[indices], maps)
+    xyz = transform(maps.view.cam_from_world, points.xyz[indices])
+    inside, pixels = look_up(xyz, maps.K, maps.shape)
+    z = xyz[inside, 2]
     parity = points.ids[indices[inside]] % 2
     common = maps.common.ravel()[pixels]
     found: dict[str, Sums] = {}
@@ -113,39 +115,16 @@ def _look_up(
 ) -> tuple[Flags, Flags]:
     """Where the map of a neighbour has a depth for a pixel, and where it agrees."""
     depth = maps.depths[method]
-    row, column = np.nonzero(asked & (depth > 0))
-    rays = pixel_rays(np.stack([column, row], axis=-1), maps.K)
-    xyz = rays * depth[row, column, np.newaxis]
-    xyz = transform(cam_from_cam(other.view, maps.view), xyz)
-    xy, z = project(xyz, other.K)
-    pixels, inside = _inside(xy, z, other.shape)
-    there = other.depths[method].ravel()[pixels]
-    agrees = np.abs(there - z[inside]) <= WITHIN * there
-    row, column = row[inside], column[inside]
+    pixels = np.flatnonzero(asked & (depth > 0))
+    xyz = lift(pixels, depth, maps.K)
+    xyz_there = transform(cam_from_cam(other.view, maps.view), xyz)
+    points, pixels_there = look_up(xyz_there, other.K, other.shape)
+    there = other.depths[method].ravel()[pixels_there]
+    agrees = np.abs(there - xyz_there[points, 2]) <= WITHIN * there
     seen_map, agrees_map = np.zeros((2, *depth.shape), np.bool_)
-    seen_map[row, column] = there > 0
-    agrees_map[row, column] = (there > 0) & agrees
+    seen_map.ravel()[pixels[points]] = there > 0
+    agrees_map.ravel()[pixels[points]] = (there > 0) & agrees
     return seen_map, agrees_map
-
-
-def _pixels(
-    xyz_in_world: Matrix, maps: ViewMaps
-) -> tuple[npt.NDArray[np.int64], Matrix, Flags]:
-    """Pixels and depths of the points inside of the map, and which points these are."""
-    xy, z = project(transform(maps.view.cam_from_world, xyz_in_world), maps.K)
-    pixels, inside = _inside(xy, z, maps.shape)
-    return pixels, z[inside], inside
-
-
-def _inside(
-    xy: Matrix, z: Matrix, shape: tuple[int, int]
-) -> tuple[npt.NDArray[np.int64], Flags]:
-    """Flat pixel indices of the points inside of the map, and which these are."""
-    height_px, width_px = shape
-    column, row = np.rint(xy.clip(-1e6, 1e6)).astype(np.int64).T
-    inside = (z > 0) & (column >= 0) & (row >= 0)
-    inside &= (column < width_px) & (row < height_px)
-    return row[inside] * width_px + column[inside], inside
 
 
 def _sums_at(

@@ -16,9 +16,16 @@ import numpy as np
 import numpy.typing as npt
 
 from resdepth_colmap.config import FuseConfig
+from resdepth_colmap.geometry.projection import (
+    lift,
+    look_up,
+    pixel_xy,
+    project,
+    transform,
+)
 from resdepth_colmap.io.point_cloud import PointCloud
 from resdepth_colmap.pipeline.fuse.views import Flags, FuseView, Indices
-from resdepth_colmap.scene import FloatMap, Matrix, NormalMap, cam_from_cam
+from resdepth_colmap.scene import FloatMap, NormalMap, cam_from_cam
 
 _PIXELS_AT_ONCE = 1 << 19  # bounds the memory of what is computed for each pixel
 
@@ -130,8 +137,8 @@ class _Chunk:
         self.reference = reference
         self.pixels = pixels
         self.config = config
-        self.xy = _xy(pixels, reference.depth.shape[1])
-        self.xyz = _lift(self.xy, reference.depth.ravel()[pixels], reference.K)
+        self.xy = pixel_xy(pixels, reference.depth.shape[1])
+        self.xyz = lift(pixels, reference.depth, reference.K)
         self.normals = reference.normals.reshape(-1, 3)[pixels]
         self.sum_xyz: FloatMap = self.xyz.copy()
         self.sum_normals = self.normals.copy()
@@ -145,8 +152,8 @@ class _Chunk:
         other_from_here = cam_from_cam(other, self.reference).astype(np.float32)
         seen, there = self._look_up(other, other_from_here)
         self.num_seen[seen] += 1
-        depth = other.depth.ravel()[there]
-        xyz = _lift(_xy(there, other.depth.shape[1]), depth, other.K)
+        xyz = lift(there, other.depth, other.K)
+        depth = xyz[:, 2]
         z_expected = self.xyz[seen] @ other_from_here[2, :3] + other_from_here[2, 3]
         agrees = np.abs(z_expected - depth) <= self.config.max_depth_error * depth
         rotation = other_from_here[:, :3]
@@ -191,21 +198,15 @@ class _Chunk:
         self, other: FuseView, other_from_here: FloatMap
     ) -> tuple[Indices, Indices]:
         """Which of the pixels fall on one with a depth, and on which."""
-        xyz = self.xyz @ other_from_here[:, :3].T + other_from_here[:, 3]
-        xy, in_front = _project(xyz, other.K)
-        height_px, width_px = other.depth.shape
-        column, row = np.rint(xy[:, 0]), np.rint(xy[:, 1])
-        inside = in_front & (column >= 0) & (row >= 0)
-        inside &= (column < width_px) & (row < height_px)
-        seen = np.flatnonzero(inside)
-        there = row[seen].astype(np.int64) * width_px + column[seen].astype(np.int64)
+        xyz = transform(other_from_here, self.xyz)
+        seen, there = look_up(xyz, other.K, other.depth.shape)
         trusted = other.is_trusted(there, self.config.min_confidence)
         return seen[trusted], there[trusted]
 
     def _reprojects(self, seen: Indices, back: FloatMap) -> Flags:
-        xy, in_front = _project(back, self.reference.K)
+        xy, z = project(back, self.reference.K)
         error = ((xy - self.xy[seen]) ** 2).sum(axis=1)
-        near: Flags = in_front & (error <= self.config.max_reproj_error**2)
+        near: Flags = (z > 0) & (error <= self.config.max_reproj_error**2)
         return near
 
     def _normals_agree(self, first: NormalMap, second: NormalMap) -> Flags:
@@ -232,25 +233,6 @@ class _Explained:
         flags = self.of(index, num_pixels)
         flags[pixels] = True
         self._bits[index] = np.packbits(flags)
-
-
-def _xy(pixels: Indices, width_px: int) -> FloatMap:
-    rows, columns = np.divmod(pixels, width_px)
-    return np.stack([columns, rows], axis=1).astype(np.float32)
-
-
-def _lift(xy: FloatMap, depth: FloatMap, K: Matrix) -> FloatMap:
-    x = (xy[:, 0] - np.float32(K[0, 2])) / np.float32(K[0, 0])
-    y = (xy[:, 1] - np.float32(K[1, 2])) / np.float32(K[1, 1])
-    return np.stack([x * depth, y * depth, depth], axis=1)
-
-
-def _project(xyz: FloatMap, K: Matrix) -> tuple[FloatMap, Flags]:
-    in_front = xyz[:, 2] > 0
-    z = np.where(in_front, xyz[:, 2], np.float32(1))
-    x = xyz[:, 0] / z * np.float32(K[0, 0]) + np.float32(K[0, 2])
-    y = xyz[:, 1] / z * np.float32(K[1, 1]) + np.float32(K[1, 2])
-    return np.stack([x, y], axis=1), in_front
 
 
 def _cloud(parts: Sequence[_Part]) -> PointCloud:
