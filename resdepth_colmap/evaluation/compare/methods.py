@@ -4,15 +4,13 @@ import dataclasses
 import shlex
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-
 from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.evaluation.compare.config import CompareConfig
-from resdepth_colmap.io.colmap.depth_map import read_depth_map
 from resdepth_colmap.io.colmap.output import OutputWorkspace
 from resdepth_colmap.io.colmap.workspace import Workspace, original_map_path
+from resdepth_colmap.pipeline.fuse.stage import refined_files
 from resdepth_colmap.pipeline.fuse.views import MapFiles
-from resdepth_colmap.pipeline.initial_map import check_map_size, map_path
+from resdepth_colmap.pipeline.initial_map import choose_initial_map, map_path
 from resdepth_colmap.pipeline.refine.cross_view import FILTERED_SHARE
 from resdepth_colmap.scene import Scene, View
 
@@ -118,11 +116,21 @@ def find_methods(
             f"{len(compared)} of {len(scene.views)} views are compared: the others "
             "lack a map of some method."
         )
+    compared_names = {view.name for view in compared}
+    files = {
+        name: tuple(_initial_file(workspace, view, kind) for view in compared)
+        for name, kind in chosen.items()
+    }
+    files[REFINED] = tuple(
+        file
+        for file in refined_files(output, scene)
+        if file.view.name in compared_names
+    )
     return FoundMethods(
         methods=tuple(
-            _method(output, compared, name, chosen.get(name, REFINED))
+            Method(name=name, kind=chosen.get(name, REFINED), files=files[name])
             for name in METHODS
-            if name == REFINED or name in chosen
+            if name in files
         ),
         notes=tuple(notes),
     )
@@ -135,11 +143,8 @@ def _filled_shares(
     shares: dict[str, list[float]] = {}
     for view in views:
         for kind in kinds[view.name]:
-            path = map_path(workspace, view.name, kind)
-            check_map_size(path, view.camera)
-            depth = read_depth_map(path)
-            share = float(np.count_nonzero(depth) / depth.size)
-            shares.setdefault(kind, []).append(share)
+            found = choose_initial_map(workspace, view.name, view.camera, [kind])
+            shares.setdefault(kind, []).append(found.filled)
     return {kind: sum(values) / len(values) for kind, values in shares.items()}
 
 
@@ -166,26 +171,7 @@ def _chosen_kinds(
     return {name: kind for name, kind in chosen.items() if kind}
 
 
-def _method(
-    output: OutputWorkspace, views: Sequence[View], name: str, kind: str
-) -> Method:
-    make = _refined_file if name == REFINED else _initial_file
-    files = tuple(make(output, view, kind) for view in views)
-    return Method(name=name, kind=kind, files=files)
-
-
-def _refined_file(output: OutputWorkspace, view: View, _kind: str) -> MapFiles:
-    return MapFiles(
-        view=view,
-        image_path=output.source.image_path(view.name),
-        depth_path=output.depth_map_path(view.name),
-        normal_path=output.normal_map_path(view.name),
-        confidence_path=output.confidence_map_path(view.name),
-    )
-
-
-def _initial_file(output: OutputWorkspace, view: View, kind: str) -> MapFiles:
-    workspace = output.source
+def _initial_file(workspace: Workspace, view: View, kind: str) -> MapFiles:
     return MapFiles(
         view=view,
         image_path=workspace.image_path(view.name),

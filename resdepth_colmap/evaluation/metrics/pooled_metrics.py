@@ -69,7 +69,9 @@ def pooled(parts: Sequence[PooledErrors]) -> PooledErrors:
     if len(parts) == 1:
         return parts[0]
     metrics = [part.metrics for part in parts]
-    histogram = np.stack([part.histogram for part in parts]).sum(0, dtype=np.uint32)
+    histogram: npt.NDArray[np.uint32] = np.zeros(_NUM_BINS, np.uint32)
+    for part in parts:
+        histogram += part.histogram
 
     def total(name: str) -> int:
         return sum(getattr(it, name) for it in metrics)
@@ -80,15 +82,14 @@ def pooled(parts: Sequence[PooledErrors]) -> PooledErrors:
         weighted = [value**power * number for value, number in pairs if number]
         return sum(weighted) / total(weight) if weighted else math.nan
 
-    shares: dict[str, Any] = {name: mean(name, "num_pixels") for name in _SHARES}
-    pooled_metrics = DepthMetrics(
+    values: dict[str, Any] = {
         **{name: total(name) for name in _COUNTS},
-        mae=mean("mae", "num_valid"),
-        rmse=math.sqrt(mean("rmse", "num_valid", power=2)),
-        medae=_median(histogram),
-        **shares,
-    )
-    return PooledErrors(metrics=pooled_metrics, histogram=histogram)
+        "mae": mean("mae", "num_valid"),
+        "rmse": math.sqrt(mean("rmse", "num_valid", power=2)),
+        "medae": _median(histogram),
+        **{name: mean(name, "num_pixels") for name in _SHARES},
+    }
+    return PooledErrors(metrics=DepthMetrics(**values), histogram=histogram)
 
 
 def _histogram(residuals: npt.NDArray[np.float64]) -> npt.NDArray[np.uint32]:
