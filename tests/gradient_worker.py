@@ -13,7 +13,7 @@ import torch
 from resdepth_colmap.config import Device
 from resdepth_colmap.network.weights import load_weights
 from resdepth_colmap.training.config import TrainConfig
-from resdepth_colmap.training.data.crops import CropSampler
+from resdepth_colmap.training.data.batches import CropSet
 from resdepth_colmap.training.distributed import join_ranks
 from resdepth_colmap.training.initialisation import fresh_network
 from resdepth_colmap.training.optimizer import Optimisation
@@ -28,14 +28,9 @@ def take_step(samples: Path, weights: Path, output: Path) -> None:
     network_config = load_weights(weights).config
     with join_ranks(Device.CPU) as ranks:
         run = Optimisation.start(fresh_network(network_config, config), config, ranks)
-        sampler = CropSampler(
-            paths=tuple(sorted(samples.glob("*.npz"))),
-            config=network_config,
-            batch_size=config.batch_size,
-            crop_px=config.crop_px,
-            seed=0,
-        )
-        batch = sampler.batch(0, ranks.rank, ranks.count)
+        paths = tuple(sorted(samples.glob("*.npz")))
+        crops = CropSet(paths=paths, network=network_config, config=config)
+        (batch,) = crops.batches([0], ranks)
         loss, wants_stop = run.step(batch, wants_stop=ranks.rank == 1)
     network = run.network
     result = {f"grad {n}": p.grad for n, p in network.named_parameters()}

@@ -63,7 +63,8 @@ class TrainConfig(Config):
         validation_steps: Refine held-out views every so many steps.
         validation_share: Share of the scenes that is held out; 0 = none.
         validation_views: Views to refine of the held-out and of the watched scenes.
-        loaders: Threads that read and cut crops.
+        loaders: Processes that read and cut crops ahead of time; 0 = the training's own
+            process does.
         device: Where to train; torchrun makes it several processes.
         precision: single (the paper's) or bfloat16, which is faster on processors with
             AVX512-BF16 or AMX and on GPUs.
@@ -168,7 +169,6 @@ _AT_LEAST_ONE = (
     "checkpoint_steps",
     "validation_steps",
     "validation_views",
-    "loaders",
     "outer_iterations",
 )
 _NOT_NEGATIVE = (
@@ -178,6 +178,7 @@ _NOT_NEGATIVE = (
     "valid_importance",
     "log_weight",
     "confidence_weight",
+    "loaders",
 )
 _PAPER: dict[str, Any] = {
     "learning_rate": 1e-5,

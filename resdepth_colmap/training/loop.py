@@ -1,11 +1,9 @@
 """The training loop: seeded, resumable, stopped by a loss that is not a number."""
 
-import collections
 import logging
 import math
 import time
-from collections.abc import Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Sequence
 from pathlib import Path
 
 import torch
@@ -24,7 +22,7 @@ from resdepth_colmap.training.checkpoint import (
 )
 from resdepth_colmap.training.config import TrainConfig
 from resdepth_colmap.training.curves import draw_curves
-from resdepth_colmap.training.data.crops import Batch
+from resdepth_colmap.training.data.batches import Batch
 from resdepth_colmap.training.data.sets import Data, Places, prepare_data
 from resdepth_colmap.training.distributed import join_ranks
 from resdepth_colmap.training.initialisation import fresh_network
@@ -38,7 +36,6 @@ logger = logging.getLogger(__name__)
 
 CURVES_NAME = "curves.png"
 PREDICTIONS_FOLDER = "predictions"
-BATCHES_AHEAD = 2  # of each loader
 
 
 def train(
@@ -124,7 +121,7 @@ class _Loop:
                 self.log.close()
 
     def _check_samples(self) -> None:
-        key, before = self.data.training.samples_key, self.position.samples_key
+        key, before = self.data.training.key, self.position.samples_key
         if before and before != key and self.ranks.is_first:
             logger.warning(
                 "%s: the samples are not those of before, so that the steps from here "
@@ -137,7 +134,9 @@ class _Loop:
         start = time.perf_counter()
         if self.log is not None and self.config.init and not self.position.step:
             self.log.add({"step": 0, **self._validate(self.log)})  # what to beat
-        for batch in self._batches():
+        steps = range(self.position.step, self.config.steps)
+        batches = self.data.training.batches(steps, self.ranks, self.config.loaders)
+        for batch in batches:
             value, wants_stop = self._step(batch)
             self.position.step += 1
             self.position.loss_sum += value
@@ -164,27 +163,6 @@ class _Loop:
                 f"step {self.position.step}: {error}; {kept}. Look at these samples' "
                 "depth maps, or lower --learning-rate."
             ) from error
-
-    def _batches(self) -> Iterator[Batch]:
-        """The batches that are left, cut by other threads ahead of time."""
-        sampler, ranks = self.data.training, self.ranks
-        steps = iter(range(self.position.step, self.config.steps))
-        pending: collections.deque[Future[Batch]] = collections.deque()
-        loader = ThreadPoolExecutor(max_workers=self.config.loaders)
-        try:
-            while True:
-                while len(pending) < BATCHES_AHEAD * self.config.loaders:
-                    step = next(steps, None)
-                    if step is None:
-                        break
-                    pending.append(
-                        loader.submit(sampler.batch, step, ranks.rank, ranks.count)
-                    )
-                if not pending:
-                    return
-                yield pending.popleft().result()
-        finally:
-            loader.shutdown(cancel_futures=True)
 
     def _is_due(self, every: int) -> bool:
         step = self.position.step
@@ -215,7 +193,7 @@ class _Loop:
         network, step = self.optimisation.network, self.position.step
         row: Row = {}
         if self.data.held_out is not None:
-            row["held_out_loss"] = mean_loss(network, self.data.held_out, self.config)
+            row["held_out_loss"] = mean_loss(network, self.data.held_out)
         score = math.inf
         for views in self.data.sets:  # the watched ones, if any, are the last
             scores, pictures = views.measure(network)

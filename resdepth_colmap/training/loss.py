@@ -7,7 +7,7 @@ from torch import Tensor
 
 from resdepth_colmap.network.unet import Refinement
 from resdepth_colmap.training.config import TrainConfig
-from resdepth_colmap.training.data.crops import Batch
+from resdepth_colmap.training.data.batches import Batch
 
 SMALL_ERROR = 0.02
 """Errors below this share of a tile's spread are in the logarithm's steep part."""

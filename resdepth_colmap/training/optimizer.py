@@ -15,7 +15,7 @@ from resdepth_colmap.training.config import (
     Schedule,
     TrainConfig,
 )
-from resdepth_colmap.training.data.crops import Batch
+from resdepth_colmap.training.data.batches import Batch
 from resdepth_colmap.training.distributed import Ranks
 from resdepth_colmap.training.loss import refinement_loss
 from resdepth_colmap.training.synced_norm import sync_norms

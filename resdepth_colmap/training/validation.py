@@ -14,8 +14,7 @@ from resdepth_colmap.io.images import read_rgb
 from resdepth_colmap.network.unet import ResDepthNet
 from resdepth_colmap.pipeline.refine.view import refine_view
 from resdepth_colmap.scene import DepthMap
-from resdepth_colmap.training.config import TrainConfig
-from resdepth_colmap.training.data.crops import CropSampler
+from resdepth_colmap.training.data.batches import CropSet
 from resdepth_colmap.training.data.labelled_views import LabelledView, labelled_views
 from resdepth_colmap.training.loss import refinement_loss
 from resdepth_colmap.viz.strips import BeforeAfter
@@ -108,16 +107,15 @@ class ValidationSet:
 
 
 @torch.inference_mode()
-def mean_loss(network: ResDepthNet, sampler: CropSampler, config: TrainConfig) -> float:
+def mean_loss(network: ResDepthNet, crops: CropSet) -> float:
     """The loss over the same few batches each time."""
     network.eval()
     device = next(network.parameters()).device
     total, num_known = 0.0, 0.0
-    for index in range(NUM_BATCHES):
-        batch = sampler.batch(index).to(device)
-        loss = refinement_loss(
-            network(batch.inputs, batch.sample_source), batch, config
-        )
+    for batch in crops.batches(range(NUM_BATCHES)):
+        batch = batch.to(device)
+        refined = network(batch.inputs, batch.sample_source)
+        loss = refinement_loss(refined, batch, crops.config)
         total += float(loss.total)
         num_known += float(loss.num_known)
     return total / max(num_known, 1.0)

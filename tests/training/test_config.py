@@ -47,7 +47,7 @@ def test_a_mapping_makes_the_same_configuration_again() -> None:
         {"validation_share": 0.6},
         {"holes_share": 1.5},
         {"log_weight": -0.1},
-        {"loaders": 0},
+        {"loaders": -1},
         {"pace": 1},
         {"schedule": "slow"},
         {"optimiser": "sgd"},

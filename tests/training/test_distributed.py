@@ -44,7 +44,8 @@ def free_port() -> int:
 def environment(**more: str) -> dict[str, str]:
     tests = Path(__file__).resolve().parents[1]
     threads = {"OMP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"}
-    return {**os.environ, **threads, "PYTHONPATH": str(tests), **more}
+    path = os.pathsep.join([str(tests), str(tests.parent)])
+    return {**os.environ, **threads, "PYTHONPATH": path, **more}
 
 
 def run_two(arguments: list[str]) -> None:

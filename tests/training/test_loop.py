@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from crop_sets import batch_of_step
 from noisy_planes import write_noisy_plane
 from planes import write_plane_workspace
 
@@ -14,7 +15,6 @@ from resdepth_colmap.io.colmap.depth_map import read_depth_map
 from resdepth_colmap.network.network_config import NetworkConfig
 from resdepth_colmap.network.weights import load_weights, save_weights
 from resdepth_colmap.training.config import Precision, TrainConfig
-from resdepth_colmap.training.data.crops import CropSampler
 from resdepth_colmap.training.data.samples import prepare_samples
 from resdepth_colmap.training.initialisation import fresh_network
 from resdepth_colmap.training.loop import train
@@ -144,24 +144,12 @@ def test_a_workspace_without_truth_says_what_is_missing(tmp_path: Path) -> None:
         train([tmp_path / "plane"], tmp_path / "run", NETWORK, TRAINING)
 
 
-def test_a_step_has_the_same_batch_whenever_it_is_asked_for(
-    workspace: Path, tmp_path: Path
-) -> None:
-    paths = tuple(prepare_samples([workspace], NETWORK, tmp_path))
-    sampler = CropSampler(paths=paths, config=NETWORK, batch_size=2, crop_px=32, seed=3)
-    first, other, again = sampler.batch(5), sampler.batch(6), sampler.batch(5)
-    assert first.names == again.names
-    assert torch.equal(first.inputs, again.inputs)
-    assert not torch.equal(first.inputs, other.inputs)
-
-
 def test_where_the_map_is_right_input_and_target_are_the_same(
     workspace: Path, tmp_path: Path
 ) -> None:
     paths = tuple(prepare_samples([workspace], NETWORK, tmp_path))
     paths = tuple(path for path in paths if path.stem.endswith("-dense"))
-    sampler = CropSampler(paths=paths, config=NETWORK, batch_size=4, crop_px=32, seed=0)
-    batch = sampler.batch(0)
+    batch = batch_of_step(paths, network=NETWORK, seed=0, vary_light=True)
     error = (batch.inputs[:, :1] - batch.target).abs()[batch.known]
     assert (error < 1e-3).float().mean() > 0.8
 

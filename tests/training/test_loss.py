@@ -10,7 +10,7 @@ from resdepth_colmap.network.unet import Refinement
 from resdepth_colmap.pipeline.refine.network_inputs import Scaling
 from resdepth_colmap.pipeline.refine.source_sampler import SourceSampler
 from resdepth_colmap.training.config import Preset, TrainConfig
-from resdepth_colmap.training.data.crops import Batch
+from resdepth_colmap.training.data.batches import Batch
 from resdepth_colmap.training.loss import refinement_loss
 
 SHAPE = (2, 1, 6, 8)

@@ -19,7 +19,7 @@ from resdepth_colmap.training.data.labelled_views import (
     labelled_views,
 )
 from resdepth_colmap.training.data.samples import (
-    AGAIN,
+    LATER,
     build_sample,
     is_whole,
     sample_path,
@@ -67,7 +67,7 @@ def prepare_later_rounds(
         for path in scenes:
             for views in _by_kind(labelled_views(path)):
                 rounds = [
-                    {view: sample_path(view, folder, AGAIN, key) for view in views}
+                    {view: sample_path(view, folder, LATER, key) for view in views}
                     for key in keys
                 ]
                 wanted = [path for paths in rounds for path in paths.values()]

@@ -34,12 +34,12 @@ from resdepth_colmap.training.data.labelled_views import (
 HOLES_CONSISTENCY = 0.25
 """Photo-consistency above which the copy "with holes" of a map has none."""
 
-DENSE, FILLED, AGAIN, HOLES = "-dense", "-completed", "-again", "-holes"
+DENSE, FILLED, LATER, HOLES = "-dense", "-filled", "-later", "-holes"
 """How the names of samples end: of a map without holes, of one that the maps of other
 views have been compared with, of one that their refined maps have been, and of a map
 with holes."""
 
-_FORMAT = 7
+_FORMAT = 8
 
 
 class Sample(NamedTuple):

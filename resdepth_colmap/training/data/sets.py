@@ -9,7 +9,7 @@ from resdepth_colmap.errors import TrainingError
 from resdepth_colmap.network.network_config import NetworkConfig
 from resdepth_colmap.progress import Progress
 from resdepth_colmap.training.config import TrainConfig
-from resdepth_colmap.training.data.crops import CropSampler
+from resdepth_colmap.training.data.batches import CropSet
 from resdepth_colmap.training.data.outer_iterations import prepare_later_rounds
 from resdepth_colmap.training.data.samples import prepare_samples
 from resdepth_colmap.training.data.scenes import (
@@ -51,8 +51,8 @@ class Data(NamedTuple):
             has any.
     """
 
-    training: CropSampler
-    held_out: CropSampler | None
+    training: CropSet
+    held_out: CropSet | None
     sets: tuple[ValidationSet, ...]
 
 
@@ -89,16 +89,7 @@ def prepare_data(
         return tuple(samples_of(part) for part in split)
 
     training, held_out = (
-        CropSampler(
-            paths=paths,
-            config=network_config,
-            batch_size=config.batch_size,
-            crop_px=config.crop_px,
-            seed=config.seed,
-            holes_share=config.holes_share,
-            valid_importance=config.valid_importance,
-            vary_light=config.vary_light,
-        )
+        CropSet(paths=paths, network=network_config, config=config)
         for paths in ranks.from_first(make)
     )
     if not training.paths:

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from crop_sets import batch_of_step
 from noisy_planes import write_noisy_plane
 from planes import NAMES
 from refined_plane import network
@@ -12,11 +13,10 @@ from workspaces import identity_weights
 
 from resdepth_colmap.network.network_config import REPROJECTED_CHANGE, NetworkConfig
 from resdepth_colmap.network.weights import save_weights
-from resdepth_colmap.training.data.crops import CropSampler
 from resdepth_colmap.training.data.outer_iterations import prepare_later_rounds
 from resdepth_colmap.training.data.samples import (
-    AGAIN,
     FILLED,
+    LATER,
     guidance_names,
     prepare_samples,
     read_sample,
@@ -53,7 +53,7 @@ def test_a_network_that_changes_nothing_makes_the_samples_of_the_first_round(
     again = prepared(scene, identity_weights(tmp_path))
     assert len(again) == len(filled_in) == len(NAMES)
     for path, expected_path in zip(again, filled_in, strict=True):
-        assert path.stem.endswith(AGAIN) and "-photometric-" in path.stem
+        assert path.stem.endswith(LATER) and "-photometric-" in path.stem
         sample, expected = read_sample(path), read_sample(expected_path)
         np.testing.assert_array_equal(sample.target, expected.target)
         assert np.mean(sample.valid == expected.valid) > 0.999
@@ -103,10 +103,7 @@ def test_more_than_half_of_the_crops_with_other_maps_are_of_later_rounds(
 ) -> None:
     paths = prepare_samples([scene], CONFIG, tmp_path / "cache")
     paths += prepared(scene, identity_weights(tmp_path))
-    sampler = CropSampler(
-        paths=tuple(paths), config=CONFIG, batch_size=200, crop_px=32, seed=0
-    )
-    names = sampler.batch(0).names
-    counts = [sum(name.endswith(end) for name in names) for end in (FILLED, AGAIN)]
+    names = batch_of_step(paths, network=CONFIG, batch_size=200, seed=0).names
+    counts = [sum(name.endswith(end) for name in names) for end in (FILLED, LATER)]
     assert sum(counts) == pytest.approx(136, abs=20)
     assert counts[1] == pytest.approx(0.6 * sum(counts), abs=20)

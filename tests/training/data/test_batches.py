@@ -1,23 +1,21 @@
-"""Laws of the crops: what is cut, mirrored and dealt out."""
+"""Laws of the batches: what is cut, mirrored and given to the network."""
 
 import dataclasses
-from collections import Counter
 from pathlib import Path
 from unittest import mock
 
 import numpy as np
 import pytest
 import torch
+from crop_sets import NETWORK, batch_of_step, crop_set
 from noisy_planes import write_noisy_plane
 
-from resdepth_colmap.errors import TrainingError
 from resdepth_colmap.network.network_config import InputVariant, NetworkConfig
 from resdepth_colmap.pipeline.refine.photometric_error import photometric_error
-from resdepth_colmap.training.data import crops
-from resdepth_colmap.training.data.crops import CropSampler
+from resdepth_colmap.training.data.crop_sampler import CropSampler, Draw
+from resdepth_colmap.training.data.crops import CropDataset
 from resdepth_colmap.training.data.samples import prepare_samples, read_sample
-
-NETWORK = NetworkConfig(levels=3, base_channels=4, max_channels=8, color=True)
+from resdepth_colmap.training.distributed import Ranks
 
 
 @pytest.fixture(scope="module")
@@ -27,31 +25,55 @@ def samples(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, ...]:
     return tuple(prepare_samples([scene], NETWORK, folder / "cache"))
 
 
-def sampler_of(samples: tuple[Path, ...], **changes: object) -> CropSampler:
-    sampler = CropSampler(
-        paths=samples,
-        config=NETWORK,
-        batch_size=4,
-        crop_px=40,
-        seed=1,
-        vary_light=False,
-    )
-    return dataclasses.replace(sampler, **changes)  # type: ignore[arg-type]
+def test_a_step_has_the_same_batch_whenever_it_is_asked_for(
+    samples: tuple[Path, ...],
+) -> None:
+    first, other, again = crop_set(samples, seed=3).batches([5, 6, 5])
+    assert first.names == again.names
+    assert torch.equal(first.inputs, again.inputs)
+    assert not torch.equal(first.inputs, other.inputs)
 
 
-def test_the_processes_share_the_batch_of_one(samples: tuple[Path, ...]) -> None:
-    sampler = sampler_of(samples, vary_light=True)
-    whole = sampler.batch(3)
-    parts = [sampler.batch(3, rank, 2) for rank in range(2)]
-    for rank, part in enumerate(parts):
-        assert torch.equal(part.inputs, whole.inputs[rank::2])
-        assert torch.equal(part.target, whole.target[rank::2])
-        assert part.names == whole.names
+@pytest.mark.filterwarnings("ignore:This DataLoader will create 2 worker")
+@pytest.mark.parametrize("num_workers", [0, 1, 2])
+def test_workers_and_processes_share_the_batches_of_one(
+    samples: tuple[Path, ...], num_workers: int
+) -> None:
+    crops = crop_set(samples, vary_light=True)
+    steps = range(3, 6)
+    whole = list(crops.batches(steps))
+    parts = [
+        list(crops.batches(steps, Ranks(rank=rank, count=2), num_workers))
+        for rank in range(2)
+    ]
+    for step, batch in enumerate(whole):
+        for rank, part in enumerate(parts):
+            assert torch.equal(part[step].inputs, batch.inputs[rank::2])
+            assert torch.equal(part[step].target, batch.target[rank::2])
+            assert part[step].names == batch.names
+
+
+def test_no_more_crops_are_cut_ahead_than_memory_holds(
+    samples: tuple[Path, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    num_drawn = 0
+    draw = CropSampler.batch
+
+    def count(sampler: CropSampler, step: int) -> list[Draw]:
+        nonlocal num_drawn
+        num_drawn += 1
+        return draw(sampler, step)
+
+    monkeypatch.setattr(CropSampler, "batch", count)
+    for num_workers, most in ((0, 1), (1, 3)):
+        num_drawn = 0
+        next(crop_set(samples).batches(range(1000), num_workers=num_workers))
+        assert num_drawn <= most
 
 
 def test_a_mirrored_crop_is_that_of_a_mirrored_pair(samples: tuple[Path, ...]) -> None:
     """The warped source still matches: its correlation is that which was stored."""
-    batch = sampler_of(samples, batch_size=16).batch(0)
+    batch = batch_of_step(samples, batch_size=16)
     names = NETWORK.channels
     reference, source, stored = (
         batch.inputs[:, [names.index(name)]]
@@ -67,32 +89,16 @@ def test_a_mirrored_crop_is_that_of_a_mirrored_pair(samples: tuple[Path, ...]) -
 
 
 def test_half_of_the_crops_are_mirrored(samples: tuple[Path, ...]) -> None:
-    one = (samples[0],)
     original = read_sample(samples[0]).target
-    sampler = sampler_of(one, batch_size=60, crop_px=40)
+    dataset = CropDataset(NETWORK, vary_light=False)
     num_mirrored = 0
-    for item in range(60):
-        _, rng = sampler._draw(0, item)
-        crop = sampler._crop(samples[0], np.array(original.shape), rng).target
+    for seed in range(60):
+        draw = Draw(samples[0], (40, 40), np.random.default_rng(seed), ())
+        crop = dataset[draw].sample.target
         gradient = np.diff(crop.astype(np.float64), axis=1).mean()
         expected = np.diff(original.astype(np.float64), axis=1).mean()
         num_mirrored += bool(gradient * expected < 0)
     assert 15 < num_mirrored < 45
-
-
-def test_images_of_different_sizes_share_a_batch(tmp_path: Path) -> None:
-    paths = []
-    for name, size_px in {"a": (80, 60), "b": (56, 96)}.items():
-        scene = write_noisy_plane(tmp_path / name, size_px=size_px)
-        paths += prepare_samples([scene], NETWORK, tmp_path / "cache")
-    sampler = sampler_of(tuple(paths), batch_size=8, crop_px=512)
-    assert sampler.batch(0).inputs.shape == (8, len(NETWORK.channels), 56, 56)
-
-
-def test_too_small_an_image_is_named(samples: tuple[Path, ...]) -> None:
-    config = NetworkConfig(levels=7)
-    with pytest.raises(TrainingError, match=r"plane-.*a side of 60 px.*7 levels"):
-        sampler_of(samples, config=config).batch(0)
 
 
 @pytest.mark.parametrize("variant", InputVariant)
@@ -100,31 +106,23 @@ def test_a_variant_sees_its_channels(
     samples: tuple[Path, ...], variant: InputVariant
 ) -> None:
     config = dataclasses.replace(NetworkConfig.paper(variant), levels=3)
-    batch = sampler_of(samples, config=config).batch(0)
+    batch = batch_of_step(samples, network=config)
     assert batch.inputs.shape[1] == len(config.channels)
     if config.residual:
         error = (batch.inputs[:, :1] - batch.target).abs()[batch.known]
         assert float(error.median()) < 1e-4
 
 
-def test_the_share_of_maps_with_holes_is_as_asked(samples: tuple[Path, ...]) -> None:
-    for share in (0.0, 1.0):
-        names = sampler_of(samples, holes_share=share, batch_size=12).batch(0).names
-        assert all(name.endswith("-holes") == bool(share) for name in names)
-    holes = tuple(path for path in samples if path.stem.endswith("-holes"))
-    assert sampler_of(holes, holes_share=0.0).batch(0).names
-
-
 def test_light_changes_photographs_alone(samples: tuple[Path, ...]) -> None:
-    plain = sampler_of(samples).batch(0)
+    plain = batch_of_step(samples)
     with mock.patch.object(
-        crops.CropSampler,
+        CropDataset,
         "_other_light",
         lambda _, c, __: c._replace(guidance=c.guidance * 0),
     ):
-        dark = sampler_of(samples, vary_light=True).batch(0)
+        dark = batch_of_step(samples, vary_light=True)
     assert (dark.inputs[:, 1:] == 0).all()
-    varied = sampler_of(samples, vary_light=True).batch(0)
+    varied = batch_of_step(samples, vary_light=True)
     for index, name in enumerate(NETWORK.channels):
         is_photo = name in ("reference", "source_0", "red", "blue")
         same = torch.equal(varied.inputs[:, index], plain.inputs[:, index])
@@ -135,7 +133,7 @@ def test_what_was_measured_counts_less_and_the_mean_is_one(
     samples: tuple[Path, ...],
 ) -> None:
     holes = tuple(path for path in samples if path.stem.endswith("-holes"))
-    batch = sampler_of(holes, valid_importance=0.25).batch(0)
+    batch = batch_of_step(holes, valid_importance=0.25)
     torch.testing.assert_close(batch.importance.mean(dim=(1, 2, 3)), torch.ones(4))
     valid = batch.inputs[:, [NETWORK.channels.index("valid")]] > 0
     mixed = [i for i in range(4) if valid[i].any() and not valid[i].all()]
@@ -144,29 +142,14 @@ def test_what_was_measured_counts_less_and_the_mean_is_one(
         measured = batch.importance[index][valid[index]]
         filled = batch.importance[index][~valid[index]]
         torch.testing.assert_close(measured.max(), 0.25 * filled.min())
-    assert (sampler_of(holes).batch(0).importance == 1).all()
+    assert (batch_of_step(holes).importance == 1).all()
 
 
-def test_a_network_that_looks_at_other_maps_is_mostly_shown_them(
-    samples: tuple[Path, ...],
-) -> None:
-    blind = dataclasses.replace(NETWORK, source_depth=False)
-    ends = {}
-    for config in (NETWORK, blind):
-        sampler = sampler_of(samples, config=config, holes_share=0.3, batch_size=300)
-        names = [sampler._draw(0, item)[0].stem for item in range(300)]
-        ends[config] = Counter(name.rsplit("-", 1)[1] for name in names)
-    assert set(ends[NETWORK]) == {"completed", "dense", "holes"}
-    assert ends[NETWORK]["completed"] > 150 > 60 > ends[NETWORK]["dense"] > 10
-    assert set(ends[blind]) == {"dense", "holes"}
-    assert ends[blind]["holes"] == ends[NETWORK]["holes"]
-
-
-def test_the_source_that_is_looked_at_again_fits_the_crop(
+def test_the_source_for_resampling_fits_the_crop(
     samples: tuple[Path, ...],
 ) -> None:
     """At the true depth it shows what the reference shows, mirrored or not."""
-    batch = sampler_of(samples, batch_size=16).batch(0)
+    batch = batch_of_step(samples, batch_size=16)
     names = NETWORK.channels
     reference = batch.inputs[:, [names.index("reference")]]
     there = batch.sample_source(batch.target)
@@ -180,13 +163,13 @@ def test_the_source_that_is_looked_at_again_fits_the_crop(
 
 def test_light_changes_the_source_alike(samples: tuple[Path, ...]) -> None:
     plain, lit = (
-        sampler_of(samples, vary_light=vary, holes_share=0.0).batch(0)
+        batch_of_step(samples, vary_light=vary, holes_share=0.0)
         for vary in (False, True)
     )
-    place = NETWORK.channels.index("source_0")
+    index = NETWORK.channels.index("source_0")
     initial = plain.inputs[:, :1]
     for batch in (plain, lit):
-        again, stored = batch.sample_source(initial), batch.inputs[:, [place]]
+        again, stored = batch.sample_source(initial), batch.inputs[:, [index]]
         torch.testing.assert_close(again.mean(), stored.mean(), rtol=0.02, atol=0)
     assert not torch.allclose(
         plain.sample_source(initial), lit.sample_source(initial), atol=0.01
