@@ -129,9 +129,13 @@ class Scene:
         depth_range: Near and far depth of each view by COLMAP's rule (1 % and 99 %
             of its sparse depths, stretched by 25 %), shape (V, 2), float64; a row is
             (0, 0) for a view without points.
+        origin_in_world: What all coordinates here are relative to, shape (3,), float64,
+            in units of the model; not 0 only for a model far from its own origin (UTM,
+            ECEF), whose coordinates single precision could not hold.
     """
 
     views: tuple[View, ...]
+    origin_in_world: Matrix = dataclasses.field(default_factory=lambda: np.zeros(3))
     num_points: int = 0
     num_shared_points: npt.NDArray[np.int64] | None = None
     triangulation_angle_deg: Matrix | None = None

@@ -1,7 +1,8 @@
 """Point clouds in files that other programs read: PLY, PCD, XYZ.
 
-All through open3d's tensor interface: it writes the coordinates as float32. (The
-legacy one writes doubles, which PCL, and so ETH3D's program, reads as zeros.)
+All through open3d's tensor interface, which writes the coordinates as they are: float32
+near the origin (PCL, and so ETH3D's program, reads doubles as zeros), doubles far from
+it, where single precision would collapse them.
 """
 
 import dataclasses
@@ -14,6 +15,7 @@ import numpy.typing as npt
 from resdepth_colmap.errors import ConfigError, FusionError, WorkspaceError
 from resdepth_colmap.io.files import whole_file
 from resdepth_colmap.io.open3d_library import load_open3d
+from resdepth_colmap.scene import Matrix
 
 CLOUD_SUFFIXES = (".ply", ".pcd", ".xyz")
 """Extensions that `write_cloud` knows; .xyz holds coordinates alone."""
@@ -25,13 +27,13 @@ class PointCloud:
 
     Attributes:
         points: Coordinates in the world frame, in workspace units, shape (N, 3),
-            float32.
+            float32, or float64 far from the origin.
         colors: RGB values, shape (N, 3), uint8.
         normals: Unit normals in the world frame, shape (N, 3), float32; (0, 0, 0) =
             none.
     """
 
-    points: npt.NDArray[np.float32]
+    points: npt.NDArray[np.floating[Any]]
     colors: npt.NDArray[np.uint8]
     normals: npt.NDArray[np.float32]
 
@@ -46,6 +48,13 @@ class PointCloud:
     def __len__(self) -> int:
         """The number of points."""
         return len(self.points)
+
+    def moved(self, offset: Matrix) -> "PointCloud":
+        """The same cloud, moved; in double precision where that is needed."""
+        if not offset.any():
+            return self
+        points = _compact(self.points.astype(np.float64) + offset)
+        return dataclasses.replace(self, points=points)
 
     def sampled(self, most: int, seed: int = 0) -> "PointCloud":
         """At most so many of the points, drawn at random, in their old order."""
@@ -77,8 +86,8 @@ def write_cloud(path: Path, cloud: PointCloud) -> None:
     """Write a cloud, whole or not at all, in the format of the path's extension.
 
     Args:
-        path: A .ply or .pcd (binary, float32 coordinates, colours, normals) or .xyz
-            (text, coordinates alone).
+        path: A .ply or .pcd (binary: coordinates, colours, normals) or .xyz (text,
+            coordinates alone).
         cloud: The points; at least one.
 
     Raises:
@@ -95,7 +104,9 @@ def write_cloud(path: Path, cloud: PointCloud) -> None:
         )
     open3d = load_open3d()
 
-    tensor_cloud = open3d.t.geometry.PointCloud(_tensor(cloud.points, np.float32))
+    tensor_cloud = open3d.t.geometry.PointCloud(
+        _tensor(cloud.points, cloud.points.dtype)
+    )
     tensor_cloud.point.colors = _tensor(cloud.colors, np.uint8)
     tensor_cloud.point.normals = _tensor(cloud.normals, np.float32)
     with whole_file(path) as partial:
@@ -134,10 +145,17 @@ def read_cloud(path: Path) -> PointCloud:
         raise WorkspaceError(f"{path}: no PLY file, broken, or without a point.")
     none = np.zeros_like(values["positions"])
     return PointCloud(
-        points=values["positions"].astype(np.float32),
+        points=_compact(values["positions"]),
         colors=values.get("colors", none).astype(np.uint8),
         normals=values.get("normals", none).astype(np.float32),
     )
+
+
+def _compact(points: npt.NDArray[np.floating[Any]]) -> npt.NDArray[np.floating[Any]]:
+    """Coordinates in single precision, unless that loses 1e-5 of the cloud's size."""
+    size = float(np.ptp(points, axis=0).max()) if len(points) else 0.0
+    step = float(np.finfo(np.float32).eps) * float(np.abs(points).max(initial=0.0))
+    return points.astype(np.float64 if step > 1e-5 * size > 0 else np.float32)
 
 
 def _tensor(values: npt.NDArray[Any], dtype: npt.DTypeLike) -> Any:

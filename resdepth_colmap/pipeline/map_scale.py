@@ -128,7 +128,7 @@ def initial_scales(
     if scene.num_shared_points is None:
         fit = _fit_to_photographs(workspace, scene, sorted(filled), read)
         return {} if fit is None else dict.fromkeys(filled, fit)
-    points = read_sparse_points(workspace.sparse_path)
+    points = read_sparse_points(workspace.sparse_path).about(scene.origin_in_world)
     fits = {}
     for index in filled:
         view = scene.views[index]

@@ -166,9 +166,12 @@ class _Report:
         before_path = cloud_before_path(self.output)
         if not path.is_file():
             return None
-        before = read_cloud(before_path) if before_path.is_file() else None
+        offset = -self.scene.origin_in_world
+        before = None
+        if before_path.is_file():
+            before = read_cloud(before_path).moved(offset)
         views = [view for view in self.scene.views if view.name in self.images]
-        return cloud_content(read_cloud(path), before, views, budget)
+        return cloud_content(read_cloud(path).moved(offset), before, views, budget)
 
 
 _NUM_TRIED = 4

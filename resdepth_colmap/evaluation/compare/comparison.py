@@ -128,7 +128,7 @@ def compare_workspace(
     inputs = MetricInputs(
         scene=scene,
         images=ViewImages(workspace, IMAGE_CACHE_BYTES),
-        points=read_sparse_points(workspace.sparse_path),
+        points=read_sparse_points(workspace.sparse_path).about(scene.origin_in_world),
         reference=reference,
     )
     maps = MethodMaps(found.methods, config.fuse.min_confidence)

@@ -1,6 +1,8 @@
 """COLMAP's sparse model, read into a Scene."""
 
+import dataclasses
 import shlex
+import tempfile
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -21,6 +23,9 @@ from resdepth_colmap.io.files import safe_name
 from resdepth_colmap.scene import Camera, Matrix, Scene, View
 
 _PINHOLES = ("PINHOLE", "SIMPLE_PINHOLE")
+FAR_SIZES = 100.0
+"""A model is far from its origin at so many times its own size."""
+
 _ANGLE_PERCENTILE = 75.0  # COLMAP's choice for the sources of its PatchMatch
 
 
@@ -42,12 +47,18 @@ def read_scene(sparse_path: Path, images_path: Path, workspace_path: Path) -> Sc
             distortion, or names an image outside of its folder.
     """
     model = open_reconstruction(sparse_path)
-    with quiet_pycolmap():
+    with quiet_pycolmap(), tempfile.TemporaryDirectory() as folder:
         try:
+            origin = _origin(model)
             views = _views(sparse_path, images_path, model)
+            if origin.any():  # MVSModel reads from a folder, into single precision
+                model.transform(pycolmap.Sim3d(1.0, pycolmap.Rotation3d(), -origin))
+                views = tuple(_about(view, origin) for view in views)
+                sparse_path = Path(folder)
+                model.write(sparse_path)
             num_points = model.num_points3D()
             if num_points == 0:
-                return Scene(views=views)
+                return Scene(views=views, origin_in_world=origin)
             mvs_model = pycolmap.MVSModel()
             mvs_model.read_from_colmap(
                 workspace_path.absolute(),
@@ -55,11 +66,39 @@ def read_scene(sparse_path: Path, images_path: Path, workspace_path: Path) -> Sc
                 images_path.absolute(),
             )
             order = np.argsort(model.reg_image_ids())  # MVSModel has them as they come
-            return _scene_with_points(views, num_points, mvs_model, order)
+            scene = _scene_with_points(views, num_points, mvs_model, order)
+            return dataclasses.replace(scene, origin_in_world=origin)
         except WorkspaceError:
             raise
         except PYCOLMAP_ERRORS as error:
             raise broken_model(sparse_path, error) from error
+
+
+def _origin(model: Any) -> Matrix:
+    """The centre of a model that is far from its origin; else (0, 0, 0).
+
+    Far: single precision, which has 24 bits, would lose more than 1e-5 of its size.
+    """
+    centers = [np.array(image.projection_center()) for image in _registered(model)]
+    points = [np.array(point.xyz) for point in model.points3D.values()]
+    xyz = np.array([*centers, *points], dtype=np.float64)
+    if not len(xyz) or not np.isfinite(xyz).all():
+        return np.zeros(3)  # said by whoever reads the views
+    low, high = np.quantile(xyz, (0.01, 0.99), axis=0)
+    center, size = np.round((low + high) / 2), float((high - low).max())
+    return center if np.abs(center).max() > FAR_SIZES * size else np.zeros(3)
+
+
+def _registered(model: Any) -> list[Any]:
+    """The images that have a pose, image ids ascending."""
+    return [model.images[image_id] for image_id in sorted(model.reg_image_ids())]
+
+
+def _about(view: View, origin: Matrix) -> View:
+    """The same view in coordinates about another origin."""
+    pose = view.cam_from_world.copy()
+    pose[:, 3] += pose[:, :3] @ origin
+    return dataclasses.replace(view, cam_from_world=pose)
 
 
 def read_image_indices(sparse_path: Path) -> dict[int, int]:
@@ -76,8 +115,8 @@ def read_image_indices(sparse_path: Path) -> dict[int, int]:
 
 
 def _views(sparse_path: Path, images_path: Path, model: Any) -> tuple[View, ...]:
-    """The images that have a pose, image ids ascending."""
-    images = [model.images[image_id] for image_id in sorted(model.reg_image_ids())]
+    """The views of the images that have a pose, image ids ascending."""
+    images = _registered(model)
     if find_model(sparse_path) == ".txt":
         whole_names = names_in_text(sparse_path)
         names = [whole_names.get(image.image_id, image.name) for image in images]

@@ -4,6 +4,7 @@ import dataclasses
 from collections import defaultdict
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
@@ -26,6 +27,10 @@ class SparsePoints:
     ids: npt.NDArray[np.int64]
     xyz: Matrix
     seen: Mapping[int, npt.NDArray[np.int64]]
+
+    def about(self, origin_in_world: Matrix) -> Self:
+        """The same points in coordinates about another origin: those of a `Scene`."""
+        return dataclasses.replace(self, xyz=self.xyz - origin_in_world)
 
     def seen_by(self, image_id: int) -> npt.NDArray[np.int64]:
         """Places of the points that an image saw, shape (M,)."""

@@ -51,6 +51,13 @@ def fuse_with_colmap(
             "fusion finds neighbouring images by the points they share, and would give "
             "no point; use --fuser open3d, which needs none."
         )
+    if scene.origin_in_world.any():
+        raise FusionError(
+            f"{workspace.sparse_path}: the model lies around "
+            f"{', '.join(f'{x:g}' for x in scene.origin_in_world)}, too far from its "
+            "origin for COLMAP's fusion, which computes in single precision; use "
+            "--fuser open3d."
+        )
     needed = min(config.min_num_views, len(files))
     cloud = _run(workspace, config, needed)
     num_pixels = sum(

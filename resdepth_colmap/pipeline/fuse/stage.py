@@ -88,7 +88,8 @@ def fuse_workspace(
         cloud, statistics = fuse_maps(files, scene, config, progress)
     if len(cloud) == 0:
         raise FusionError(_why_nothing(output.workspace, statistics))
-    return _cleaned(cloud, statistics, config)
+    fused = _cleaned(cloud, statistics, config)
+    return dataclasses.replace(fused, cloud=fused.cloud.moved(scene.origin_in_world))
 
 
 def fuse_initial(
@@ -115,7 +116,8 @@ def fuse_initial(
         WorkspaceError: If a map cannot be read.
     """
     files = initial_files(workspace, scene, images)
-    return fuse_maps(files, scene, config, progress, "Fusing as it was")
+    before = fuse_maps(files, scene, config, progress, "Fusing as it was")
+    return before._replace(cloud=before.cloud.moved(scene.origin_in_world))
 
 
 def initial_files(
