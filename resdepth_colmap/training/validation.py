@@ -15,7 +15,11 @@ from resdepth_colmap.network.unet import ResDepthNet
 from resdepth_colmap.pipeline.refine.view import refine_view
 from resdepth_colmap.scene import DepthMap
 from resdepth_colmap.training.data.batches import CropSet
-from resdepth_colmap.training.data.labelled_views import LabelledView, labelled_views
+from resdepth_colmap.training.data.labelled_views import (
+    LabelledView,
+    labelled_views,
+    load_views,
+)
 from resdepth_colmap.training.loss import refinement_loss
 from resdepth_colmap.viz.strips import BeforeAfter
 
@@ -99,11 +103,9 @@ class ValidationSet:
     def _refined(
         self, network: ResDepthNet
     ) -> Iterator[tuple[LabelledView, DepthMap, DepthMap, DepthMap]]:
-        for view in self.views:
-            loaded = view.load(network.config.num_sources)
-            if loaded is not None:
-                refined = refine_view(loaded.inputs, network, _REFINING).depth
-                yield view, loaded.inputs.depth, refined, loaded.truth
+        for view, loaded in load_views(self.views, network.config.num_sources):
+            refined = refine_view(loaded.inputs, network, _REFINING).depth
+            yield view, loaded.inputs.depth, refined, loaded.truth
 
 
 @torch.inference_mode()

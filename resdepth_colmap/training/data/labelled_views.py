@@ -6,7 +6,7 @@ Each map of a view counts by itself: unfiltered and filtered ones have other mis
 import dataclasses
 import functools
 import logging
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -25,6 +25,7 @@ from resdepth_colmap.pipeline.initial_map import (
 )
 from resdepth_colmap.pipeline.refine.cross_view import NUM_SOURCE_MAPS
 from resdepth_colmap.pipeline.refine.load_view import view_inputs
+from resdepth_colmap.pipeline.refine.loop import IMAGE_CACHE_BYTES
 from resdepth_colmap.pipeline.refine.view import ViewInputs
 from resdepth_colmap.pipeline.stereo.stage import stereo_workspace
 from resdepth_colmap.pipeline.view_images import ViewImages
@@ -99,24 +100,47 @@ class LabelledView:
                 paths[choice.index] = map_path(self.workspace, name, self.kind)
         return paths
 
-    def load(self, num_sources: int) -> Loaded | None:
-        """Read it with so many second views; None if its map is of a failed pair.
+    def load(self, num_sources: int, images: ViewImages | None = None) -> Loaded | None:
+        """Read the view; None if its map fails `_is_usable`.
+
+        Args:
+            num_sources: Number of sources.
+            images: Loads images and maps; several views of a workspace can share one.
 
         Raises:
             WorkspaceError: If a file is missing or broken.
         """
-        view = self.scene.views[self.index]
-        check_map_size(self.map_path, view.camera)
-        depth = read_depth_map(self.map_path)
+        images = images or ViewImages(self.workspace, IMAGE_CACHE_BYTES)
+        check_map_size(self.map_path, self.scene.views[self.index].camera)
+        depth = images.whole_map(self.map_path)
         truth = nearest_resized(read_depth_map(self.truth_path), depth.shape[::-1])
         if not _is_usable(depth, truth):
             return None
         choices = choose_sources(self.scene, self.index, num_sources)
-        images = ViewImages(self.workspace, 1 + num_sources)
         sources = [choice.index for choice in choices]
-        maps = {i: read_depth_map(path) for i, path in self.other_map_paths.items()}
+        maps = {i: images.whole_map(path) for i, path in self.other_map_paths.items()}
         inputs = view_inputs(self.scene, self.index, sources, depth, images, maps)
         return Loaded(inputs, truth)
+
+
+def load_views(
+    views: Sequence[LabelledView], num_sources: int
+) -> Iterator[tuple[LabelledView, Loaded]]:
+    """Load views, those with unusable maps left out.
+
+    Of consecutive views of one workspace, images and maps that they share are read
+    once, as far as the cache holds them.
+
+    Raises:
+        WorkspaceError: If a file is missing or broken.
+    """
+    images: ViewImages | None = None
+    for view in views:
+        if images is None or images.workspace != view.workspace:
+            images = ViewImages(view.workspace, IMAGE_CACHE_BYTES)
+        loaded = view.load(num_sources, images)
+        if loaded is not None:
+            yield view, loaded
 
 
 def labelled_views(

@@ -1,8 +1,8 @@
-"""Samples of later rounds: compared with the refined maps of other views."""
+"""Samples of later outer iterations: compared with the refined maps of other views."""
 
 import collections
 import dataclasses
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from resdepth_colmap.config import RefineConfig
@@ -17,38 +17,39 @@ from resdepth_colmap.training.data.labelled_views import (
     LabelledView,
     Loaded,
     labelled_views,
+    load_views,
 )
 from resdepth_colmap.training.data.samples import (
     LATER,
     build_sample,
-    is_whole,
+    is_unfiltered,
     sample_path,
     samples_folder,
     write_sample,
 )
 
 
-def prepare_later_rounds(
+def prepare_later_iterations(
     scenes: Sequence[Path],
     config: NetworkConfig,
     cache: Path,
     weights: Path,
-    num_rounds: int,
+    num_iterations: int,
     progress: Progress | None = None,
 ) -> list[Path]:
-    """Build the samples of the second and of later rounds of refining.
+    """Build the samples of the second and of later outer iterations.
 
-    Each whole map of a view is compared with those of its other views after the weights
-    have refined these, once for the second round, twice for the third. A view whose
-    other views have no ground truth has no such sample.
+    Each unfiltered map of a view is compared with those of its other views after the
+    weights have refined these, once for the second iteration, twice for the third. A
+    view whose other views have no ground truth has no such sample.
 
     Args:
-        scenes: Workspaces that `prepare_samples` has been through.
+        scenes: Workspaces after `prepare_samples`.
         config: The network that will be trained.
-        cache: Folder of the samples; those that are there and up to date are kept.
-        weights: What the maps of the other views are refined with.
-        num_rounds: The last round that there are samples of.
-        progress: Is told of each workspace.
+        cache: Folder of the samples; those that exist and are up to date are kept.
+        weights: Weights that refine the maps of the other views.
+        num_iterations: Outer iterations in all.
+        progress: Advances with each workspace.
 
     Returns:
         Paths of the samples, in the order of the workspaces; maybe none.
@@ -61,60 +62,55 @@ def prepare_later_rounds(
     network = for_inference(load_weights(weights))
     folder = samples_folder(cache, config.num_sources)
     key = weights_hash(weights)
-    keys = [f"{key} {number}" for number in range(2, num_rounds + 1)]
+    keys = [f"{key} {index}" for index in range(2, num_iterations + 1)]
     found: list[Path] = []
     with progress.stage("Refining other views", len(scenes)) as advance:
-        for path in scenes:
-            for views in _by_kind(labelled_views(path)):
-                rounds = [
+        for scene in scenes:
+            kinds = collections.defaultdict(list)
+            for view in labelled_views(scene):
+                kinds[view.kind].append(view)
+            for views in kinds.values():
+                paths = [
                     {view: sample_path(view, folder, LATER, key) for view in views}
                     for key in keys
                 ]
-                wanted = [path for paths in rounds for path in paths.values()]
-                if not all(path.exists() for path in wanted):
-                    _write_samples(views, config.num_sources, network, rounds)
+                wanted = [path for each in paths for path in each.values()]
+                if len(views) > 1 and not all(path.exists() for path in wanted):
+                    _write_samples(views, config.num_sources, network, paths)
                 found += [path for path in wanted if path.exists()]
             advance(1.0)
     return found
-
-
-def _by_kind(views: Sequence[LabelledView]) -> Iterator[list[LabelledView]]:
-    """Views of one kind of map, where there are several: they look at each other."""
-    kinds = collections.defaultdict(list)
-    for view in views:
-        kinds[view.kind].append(view)
-    return (group for group in kinds.values() if len(group) > 1)
 
 
 def _write_samples(
     views: Sequence[LabelledView],
     num_sources: int,
     network: ResDepthNet,
-    rounds: Sequence[Mapping[LabelledView, Path]],
+    paths: Sequence[Mapping[LabelledView, Path]],
 ) -> None:
-    """Refine all views round by round, and write what each sees of the others then."""
-    loaded: dict[LabelledView, Loaded] = {}
-    for view in views:
-        found = view.load(num_sources)
-        if found is not None and is_whole(found.inputs.depth):
-            loaded[view] = found
-    seen = {view: found.inputs for view, found in loaded.items()}
-    for paths in rounds:
+    """Refine views of one kind of map, and write their samples of each iteration."""
+    loaded = {
+        view: found
+        for view, found in load_views(views, num_sources)
+        if is_unfiltered(found.inputs.depth)
+    }
+    inputs = {view: found.inputs for view, found in loaded.items()}
+    for iteration_paths in paths:
         refined = {
-            view.index: refine_view(inputs, network, RefineConfig()).depth
-            for view, inputs in seen.items()
+            view.index: refine_view(own, network, RefineConfig()).depth
+            for view, own in inputs.items()
         }
-        seen = {view: _after(found, view, refined) for view, found in loaded.items()}
-        for view, inputs in seen.items():
-            if inputs.source_maps:
-                found = loaded[view]._replace(inputs=inputs)
-                write_sample(paths[view], build_sample(found, num_sources))
+        inputs = {view: _updated(view, loaded[view], refined) for view in loaded}
+        for view, own in inputs.items():
+            if own.source_maps:
+                sample = build_sample(loaded[view]._replace(inputs=own), num_sources)
+                write_sample(iteration_paths[view], sample)
 
 
-def _after(
-    loaded: Loaded, view: LabelledView, refined: Mapping[int, DepthMap]
+def _updated(
+    view: LabelledView, loaded: Loaded, refined: Mapping[int, DepthMap]
 ) -> ViewInputs:
-    """What a view sees once others, by their positions, are refined."""
+    """The inputs of a view with the refined maps of others, by their index."""
     own = loaded.inputs
     paired = zip(view.other_map_paths, own.source_maps, strict=True)
     maps = tuple(

@@ -10,7 +10,7 @@ from resdepth_colmap.network.network_config import NetworkConfig
 from resdepth_colmap.progress import Progress
 from resdepth_colmap.training.config import TrainConfig
 from resdepth_colmap.training.data.batches import CropSet
-from resdepth_colmap.training.data.outer_iterations import prepare_later_rounds
+from resdepth_colmap.training.data.outer_iterations import prepare_later_iterations
 from resdepth_colmap.training.data.samples import prepare_samples
 from resdepth_colmap.training.data.scenes import (
     Split,
@@ -80,7 +80,7 @@ def prepare_data(
         paths = prepare_samples(part, network_config, cache, progress)
         if config.outer_iterations > 1 and config.init is not None:
             weights = init_path(config.init)
-            paths += prepare_later_rounds(
+            paths += prepare_later_iterations(
                 part, network_config, cache, weights, config.outer_iterations, progress
             )
         return tuple(paths)

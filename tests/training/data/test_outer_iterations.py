@@ -1,4 +1,4 @@
-"""Laws of the samples of later rounds: what the others' maps look like in them."""
+"""Laws of the samples of later outer iterations: the maps of other views in them."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from workspaces import identity_weights
 
 from resdepth_colmap.network.network_config import REPROJECTED_CHANGE, NetworkConfig
 from resdepth_colmap.network.weights import save_weights
-from resdepth_colmap.training.data.outer_iterations import prepare_later_rounds
+from resdepth_colmap.training.data.outer_iterations import prepare_later_iterations
 from resdepth_colmap.training.data.samples import (
     FILLED,
     LATER,
@@ -30,9 +30,9 @@ def scene(tmp_path: Path) -> Path:
     return write_noisy_plane(tmp_path / "room", kinds=("photometric", "geometric"))
 
 
-def prepared(scene: Path, weights: Path, num_rounds: int = 2) -> list[Path]:
+def prepared(scene: Path, weights: Path, num_iterations: int = 2) -> list[Path]:
     cache = scene.parent / "cache"
-    return prepare_later_rounds([scene], CONFIG, cache, weights, num_rounds)
+    return prepare_later_iterations([scene], CONFIG, cache, weights, num_iterations)
 
 
 def farther_weights(path: Path, source_depth: bool = False) -> Path:
@@ -45,7 +45,7 @@ def farther_weights(path: Path, source_depth: bool = False) -> Path:
     return path / "farther.safetensors"
 
 
-def test_a_network_that_changes_nothing_makes_the_samples_of_the_first_round(
+def test_a_network_that_changes_nothing_makes_the_samples_of_the_first_iteration(
     scene: Path, tmp_path: Path
 ) -> None:
     firsts = prepare_samples([scene], CONFIG, tmp_path / "cache")
@@ -64,27 +64,27 @@ def test_a_network_that_changes_nothing_makes_the_samples_of_the_first_round(
 def test_what_the_others_say_is_what_the_network_made_of_it(
     scene: Path, tmp_path: Path
 ) -> None:
-    place = guidance_names(CONFIG.num_sources).index(REPROJECTED_CHANGE)
+    index = guidance_names(CONFIG.num_sources).index(REPROJECTED_CHANGE)
     first, second = (
-        [read_sample(path).guidance[place] for path in prepared(scene, weights)]
+        [read_sample(path).guidance[index] for path in prepared(scene, weights)]
         for weights in (identity_weights(tmp_path), farther_weights(tmp_path))
     )
     for same, farther in zip(first, second, strict=True):
         assert np.median(farther[farther != 0]) < np.median(same[same != 0]) - 0.005
 
 
-def test_what_a_third_round_looks_at_was_refined_twice(
+def test_what_a_third_iteration_sees_was_refined_twice(
     scene: Path, tmp_path: Path
 ) -> None:
     weights = farther_weights(tmp_path, source_depth=True)
-    seconds, both = prepared(scene, weights), prepared(scene, weights, num_rounds=3)
+    seconds, both = prepared(scene, weights), prepared(scene, weights, num_iterations=3)
     thirds = [path for path in both if path not in seconds]
     assert len(both) == 2 * len(thirds) == 2 * len(NAMES)
-    place = guidance_names(CONFIG.num_sources).index(REPROJECTED_CHANGE)
+    index = guidance_names(CONFIG.num_sources).index(REPROJECTED_CHANGE)
     for second, third in zip(seconds, thirds, strict=True):
         before, after = read_sample(second), read_sample(third)
         np.testing.assert_array_equal(before.target, after.target)
-        assert np.any(before.guidance[place] != after.guidance[place])
+        assert np.any(before.guidance[index] != after.guidance[index])
 
 
 def test_samples_are_kept_until_maps_or_weights_change(
@@ -98,7 +98,7 @@ def test_samples_are_kept_until_maps_or_weights_change(
     assert not {*prepared(scene, identity_weights(tmp_path, seed=1))} & {*paths}
 
 
-def test_more_than_half_of_the_crops_with_other_maps_are_of_later_rounds(
+def test_more_than_half_of_the_crops_with_other_maps_are_of_later_iterations(
     scene: Path, tmp_path: Path
 ) -> None:
     paths = prepare_samples([scene], CONFIG, tmp_path / "cache")

@@ -1,7 +1,10 @@
 """Laws of the samples: which maps become one, and what is in them."""
 
 import os
+from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +16,7 @@ from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.geometry.resize import nearest_resized
 from resdepth_colmap.io.colmap.depth_map import read_depth_map, write_depth_map
 from resdepth_colmap.network.network_config import InputVariant, NetworkConfig
+from resdepth_colmap.pipeline import view_images
 from resdepth_colmap.training.data import labelled_views as labelled_views_module
 from resdepth_colmap.training.data.labelled_views import labelled_views
 from resdepth_colmap.training.data.samples import (
@@ -71,6 +75,27 @@ def test_a_sample_is_made_anew_when_its_map_changes_and_only_then(
     assert sum("-3.png-" in stem for stem in new) == 3
     # The others look at it; maps of another kind do not.
     assert all("-photometric-" in stem for stem in new)
+
+
+def test_each_image_and_map_is_read_once_for_all_samples_of_a_workspace(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = write_noisy_plane(tmp_path / "room", kinds=("photometric", "geometric"))
+    reads: Counter[Path] = Counter()
+
+    def counted(read: Callable[[Path], Any]) -> Callable[[Path], Any]:
+        def count(path: Path) -> Any:
+            reads[path] += 1
+            return read(path)
+
+        return count
+
+    for name in ("read_gray", "read_depth_map"):
+        original = getattr(view_images, name)
+        monkeypatch.setattr(view_images, name, counted(original))
+    prepare_samples([scene], NETWORK, tmp_path / "cache")
+    assert len(reads) == 3 * len(NAMES)  # images, and maps of two kinds
+    assert set(reads.values()) == {1}
 
 
 def test_all_variants_share_their_samples(tmp_path: Path) -> None:
