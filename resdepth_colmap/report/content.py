@@ -28,7 +28,7 @@ from resdepth_colmap.viz.colormaps import (
     DIFFERENCE_COLORS,
     ERROR_COLORS,
     ERROR_RANGE,
-    color_bar,
+    color_table,
 )
 
 CONFIDENCE_COLORS = "viridis"
@@ -121,7 +121,7 @@ def color_tables() -> dict[str, Any]:
         "confidence": CONFIDENCE_COLORS,
     }
     tables = {
-        key: base64.b64encode(color_bar(name, 256, 1).tobytes()).decode("ascii")
+        key: base64.b64encode(color_table(name).tobytes()).decode("ascii")
         for key, name in names.items()
     }
     return {

@@ -11,9 +11,10 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image
 
+from resdepth_colmap.geometry.resize import area_resized
 from resdepth_colmap.io.png import encode_png
 from resdepth_colmap.scene import ColorImage, DepthMap, FloatMap
-from resdepth_colmap.viz.canvas import fitted_size, resized
+from resdepth_colmap.viz.panels import fitted_size
 
 MAX_VALUE = 65535
 CONFIDENCE_LEVELS = 63
@@ -54,9 +55,8 @@ def packed_confidence(confidence: FloatMap) -> bytes:
 
 def packed_photo(rgb: ColorImage, long_side_px: int) -> bytes:
     """The JPEG of a photo with a bounded long side."""
-    height_px, width_px = rgb.shape[:2]
-    if max(height_px, width_px) > long_side_px:
-        rgb = resized(rgb, *fitted_size((height_px, width_px), long_side_px))
+    if max(rgb.shape[:2]) > long_side_px:
+        rgb = area_resized(rgb, fitted_size(rgb.shape, long_side_px))
     memory = io.BytesIO()
     Image.fromarray(rgb).save(
         memory, format="JPEG", quality=_JPEG_QUALITY, optimize=True, progressive=True

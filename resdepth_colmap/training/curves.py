@@ -2,13 +2,12 @@
 
 from collections.abc import Sequence
 
-import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from resdepth_colmap.scene import ColorImage
 from resdepth_colmap.training.log import Row
+from resdepth_colmap.viz.panels import rendered
 
 _PANELS = {
     "loss": {"loss": "training", "held_out_loss": "held out"},
@@ -41,14 +40,11 @@ def draw_curves(rows: Sequence[Row]) -> ColorImage:
         if any(name in row for row in rows for name in names)
     }
     figure = Figure(figsize=(8, 2.8 * max(len(panels), 1)), layout="constrained")
-    canvas = FigureCanvasAgg(figure)
     for index, (title, names) in enumerate(panels.items()):
         axes = figure.add_subplot(len(panels), 1, index + 1)
         _draw(axes, rows, names)
         axes.set_title(title, loc="left", fontsize=10)
-    canvas.draw()  # type: ignore[no-untyped-call] # no stubs
-    rgba = canvas.buffer_rgba()  # type: ignore[no-untyped-call] # no stubs
-    return np.asarray(rgba)[..., :3].copy()
+    return rendered(figure)
 
 
 def _draw(axes: Axes, rows: Sequence[Row], names: dict[str, str]) -> None:

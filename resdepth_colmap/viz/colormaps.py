@@ -2,17 +2,18 @@
 
 import dataclasses
 import math
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import matplotlib
 import numpy as np
-import numpy.typing as npt
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LogNorm, Normalize
 
 from resdepth_colmap.geometry.inverse_depth import invert_map
 from resdepth_colmap.scene import ColorImage, DepthMap, FloatMap
 
-HOLE_COLOR = (200, 200, 200)
-"""RGB of what has no value; light, because both ends of the depth colours are dark."""
+HOLE_COLOR = "#c8c8c8"
+"""Of what has no value: light, because both ends of the depth colours are dark."""
 
 DEPTH_COLORS = "turbo"
 DIFFERENCE_COLORS = "RdBu_r"
@@ -23,6 +24,39 @@ ERROR_RANGE = (0.001, 0.1)
 _ROBUST_PERCENT = (2.0, 98.0)
 _LEAST_SPREAD = 0.01  # of the inverse depth: a fronto-parallel wall has none
 _LEAST_DIFFERENCE = 0.001
+
+Ticks = list[tuple[float, str]]
+"""Position on a bar of colours, in 0..1, and text of each tick."""
+
+
+class ColorScale(NamedTuple):
+    """The colours that values are shown in, and the text of their bar.
+
+    Attributes:
+        norm: From the values to 0..1.
+        colors: Name of the colours.
+        ticks: What is written on the bar.
+        label: What the values are, with their unit.
+        hole: What a pixel without a value is.
+    """
+
+    norm: Normalize
+    colors: str
+    ticks: Ticks
+    label: str
+    hole: str
+
+    @property
+    def mappable(self) -> ScalarMappable:
+        """The same for matplotlib."""
+        colors = matplotlib.colormaps[self.colors].with_extremes(bad=HOLE_COLOR)
+        return ScalarMappable(self.norm, colors)
+
+    def colored(self, values: FloatMap) -> ColorImage:
+        """Values as RGB, shape (H, W, 3), uint8; NaN has the colour of holes."""
+        colors: Any = self.mappable.to_rgba(values, bytes=True)
+        rgb: ColorImage = colors[..., :3]
+        return rgb
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -49,13 +83,23 @@ class DepthScale:
                 return cls(least=least - missing / 2, most=most + missing / 2)
         return cls(least=0.5, most=1.0)
 
-    def colored(self, depth: DepthMap) -> ColorImage:
-        """A depth map in colours, blue far, red near; holes in their own colour."""
-        inverse = invert_map(depth)
-        unit = (inverse - self.least) / (self.most - self.least)
-        return _colored(unit, inverse > 0, DEPTH_COLORS)
+    @property
+    def colors(self) -> ColorScale:
+        """The colours of inverse depth, blue far, red near; the bar is in depths."""
+        return ColorScale(
+            Normalize(self.least, self.most),
+            DEPTH_COLORS,
+            self.ticks(),
+            label="depth in workspace units",
+            hole="no depth",
+        )
 
-    def ticks(self, number: int = 5) -> list[tuple[float, str]]:
+    def colored(self, depth: DepthMap) -> ColorImage:
+        """A depth map in these colours."""
+        inverse = invert_map(depth)
+        return self.colors.colored(np.where(inverse > 0, inverse, np.float32(np.nan)))
+
+    def ticks(self, number: int = 5) -> Ticks:
         """Round depths on the scale: where in 0..1, and how they are written."""
         inverse = np.linspace(self.least, self.most, number + 2)[1:-1]
         depths = [float(1.0 / value) for value in inverse]
@@ -86,31 +130,27 @@ def difference_limit(difference: FloatMap) -> float:
     return next(f * power for f in (1, 2, 5, 10) if f * power >= least * (1 - 1e-6))
 
 
-def colored_difference(difference: FloatMap, limit: float) -> ColorImage:
-    """A signed difference in colours: blue nearer, red farther than before."""
-    return _colored(
-        0.5 + 0.5 * difference / limit, np.isfinite(difference), DIFFERENCE_COLORS
+def difference_scale(difference: FloatMap) -> ColorScale:
+    """The colours of signed differences: blue nearer, red farther than before."""
+    limit = difference_limit(difference)
+    ticks = [(0.0, f"-{100 * limit:g} %"), (0.5, "0"), (1.0, f"+{100 * limit:g} %")]
+    norm = Normalize(-limit, limit)
+    return ColorScale(norm, DIFFERENCE_COLORS, ticks, "nearer | farther", "was a hole")
+
+
+def error_scale() -> ColorScale:
+    """The colours of relative errors: logarithmic, bright = large."""
+    return ColorScale(
+        LogNorm(*ERROR_RANGE, clip=True),
+        ERROR_COLORS,
+        [(0.0, "0.1 %"), (0.5, "1 %"), (1.0, "10 %")],
+        label="error, in percent of the depth",
+        hole="no depth or no truth",
     )
 
 
-def colored_error(relative_error: FloatMap) -> ColorImage:
-    """Relative errors in logarithmic colours, bright = large; NaN = none."""
-    low, high = ERROR_RANGE
-    size = np.clip(np.abs(relative_error), low, high)
-    unit = (np.log(size / low) / math.log(high / low)).astype(np.float32)
-    return _colored(unit, np.isfinite(relative_error), ERROR_COLORS)
-
-
-def color_bar(name: str, width_px: int, height_px: int) -> ColorImage:
-    """All colours of a scale from left to right, shape (height_px, width_px, 3)."""
-    unit = np.tile(np.linspace(0, 1, width_px, dtype=np.float32), (height_px, 1))
-    return _colored(unit, np.ones(unit.shape, np.bool_), name)
-
-
-def _colored(unit: FloatMap, present: npt.NDArray[np.bool_], name: str) -> ColorImage:
+def color_table(name: str) -> ColorImage:
+    """All colours of a scale from first to last, shape (256, 3), uint8."""
     colors: Any = matplotlib.colormaps[name]
-    table = np.rint(255 * colors(np.arange(256))[:, :3]).astype(np.uint8)
-    index = np.clip(np.where(present, unit, 0) * 255 + 0.5, 0, 255).astype(np.uint8)
-    picture: ColorImage = table[index]
-    picture[~present] = HOLE_COLOR
-    return picture
+    table: ColorImage = np.rint(255 * colors(np.arange(256))[:, :3]).astype(np.uint8)
+    return table

@@ -1,38 +1,28 @@
 """One image's before and after: photo, both depth maps, what changed, what is wrong."""
 
 import dataclasses
-from typing import NamedTuple, Self
+import functools
+from collections.abc import Callable, Sequence
 
 import numpy as np
+import numpy.typing as npt
 
+from resdepth_colmap.geometry.resize import nearest_resized
 from resdepth_colmap.scene import ColorImage, DepthMap, FloatMap
-from resdepth_colmap.viz.canvas import (
-    BAR_HEIGHT_PX,
-    BAR_LABEL_HEIGHT_PX,
-    Canvas,
-    fitted_size,
-    resized,
-    shortened,
-)
 from resdepth_colmap.viz.colormaps import (
-    DEPTH_COLORS,
-    DIFFERENCE_COLORS,
-    ERROR_COLORS,
     DepthScale,
-    colored_difference,
-    colored_error,
-    difference_limit,
+    difference_scale,
+    error_scale,
     relative_difference,
 )
+from resdepth_colmap.viz.panels import Panel, draw_panels, fitted_size, resized
 
-PANEL_LONG_SIDE_PX = 480
-LEAST_PANEL_WIDTH_PX = 250  # the words above a panel need as much
-
-_MARGIN_PX = 20
-_GAP_PX = 14
-_TITLE_HEIGHT_PX = 40
-_CAPTION_HEIGHT_PX = 44
-_LEGEND_HEIGHT_PX = 10 + BAR_HEIGHT_PX + BAR_LABEL_HEIGHT_PX + 26
+_PANEL_PX = 480
+_LEAST_PANEL_PX = 250
+_THUMBNAIL_PX = 220
+_TALLEST_THUMBNAIL_PX = 280
+_LEAST_BLOCK_PX = 470
+_GAP_PX = 10
 _BAD_ERROR = 0.02
 
 
@@ -46,6 +36,9 @@ class BeforeAfter:
         before: Initial depth, shape (H, W), in workspace units; 0 = no depth.
         after: Refined depth, same shape.
         truth: True depth, same shape, 0 = not known; None = nothing is known.
+
+    Raises:
+        ValueError: If the maps differ in size.
     """
 
     name: str
@@ -54,192 +47,135 @@ class BeforeAfter:
     after: DepthMap
     truth: DepthMap | None = None
 
-    @property
-    def filled(self) -> tuple[float, float]:
-        """Share of pixels with a depth before and after, in 0..1."""
-        return filled_share(self.before), filled_share(self.after)
+    def __post_init__(self) -> None:
+        """Compare the sizes."""
+        maps = (self.before, self.after, self.truth)
+        shapes = [depth.shape for depth in maps if depth is not None]
+        if len(set(shapes)) > 1:
+            raise ValueError(f"maps of {self.name} differ in size: {shapes}.")
 
+    @functools.cached_property
+    def difference(self) -> FloatMap:
+        """Relative difference, shape (H, W); NaN where either has no depth."""
+        return relative_difference(self.before, self.after)
 
-class _Panel(NamedTuple):
-    picture: ColorImage
-    title: str
-    detail: str
+    @functools.cached_property
+    def scale(self) -> DepthScale:
+        """The colours of both depth maps: those of the range of the refined one."""
+        return DepthScale.of(self.after, self.before)
 
-
-class _Bar(NamedTuple):
-    colors: str
-    ticks: list[tuple[float, str]]
-    label: str
-    hole: str
-
-
-def filled_share(depth: DepthMap) -> float:
-    """Share of pixels with a depth, in 0..1; 0 of an empty map."""
-    return float(np.count_nonzero(depth > 0) / max(depth.size, 1))
+    def pictures(self, long_side_px: int) -> list[ColorImage]:
+        """Photo, initial and refined depth in one size."""
+        size_px = fitted_size(self.before.shape, long_side_px)
+        maps = [
+            _shown(depth, self.scale.colored, size_px)
+            for depth in (self.before, self.after)
+        ]
+        return [resized(self.rgb, size_px), *maps]
 
 
 def depth_strip(content: BeforeAfter) -> ColorImage:
     """Draw the strip: photo, initial depth, refined depth, difference.
 
-    Both depth maps have the same colours, linear in inverse depth over the 2-98 % range
-    of the refined one. With the truth, the relative error of both maps follows.
+    With the truth, the relative error of both maps follows, in a second row.
 
     Returns:
         RGB values, shape (height, width, 3), uint8.
-
-    Raises:
-        ValueError: If the maps differ in size.
     """
-    _check_sizes(content)
-    scale = DepthScale.of(content.after, content.before)
-    difference = relative_difference(content.before, content.after)
-    limit = difference_limit(difference)
+    before, after, difference = content.before, content.after, content.difference
+    size_px = fitted_size(before.shape, _PANEL_PX)
+    photo, initial, refined = content.pictures(_PANEL_PX)
+    filled = [f"{_filled(depth)} of the pixels filled" for depth in (before, after)]
+    scale = difference_scale(difference)
+    change = f"median {_median(difference)} of the depth"
     panels = [
-        *_depth_panels(content, scale),
-        _Panel(
-            colored_difference(difference, limit),
-            "Difference",
-            f"median {100 * _median(np.abs(difference)):.2g} % of the depth",
-        ),
-        *_error_panels(content),
+        Panel(photo, "Photo", _size(content.rgb)),
+        Panel(initial, "Initial depth", filled[0], content.scale.colors, bar_panels=2),
+        Panel(refined, "Refined depth", filled[1]),
+        Panel(_shown(difference, scale.colored, size_px), "Difference", change, scale),
     ]
-    grid = _Grid.of(content, len(panels))
-    canvas = Canvas(grid.canvas_width_px, grid.canvas_height_px)
-    _write_title(canvas, content)
-    for place, panel in enumerate(panels):
-        _draw_panel(canvas, grid, place, panel)
-    _draw_bars(canvas, grid, scale, limit)
-    return canvas.rgb()
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class _Grid:
-    """Where the panels are: without the truth in one row, with it in two of three."""
-
-    width_px: int
-    height_px: int
-    num_columns: int
-    num_rows: int
-
-    @classmethod
-    def of(cls, content: BeforeAfter, num_panels: int) -> Self:
-        height_px, width_px = fitted_size(content.before.shape, PANEL_LONG_SIDE_PX)
-        num_rows = 1 if content.truth is None else 2
-        return cls(
-            width_px=width_px,
-            height_px=height_px,
-            num_columns=num_panels // num_rows,
-            num_rows=num_rows,
-        )
-
-    @property
-    def pitch_px(self) -> int:
-        return max(self.width_px, LEAST_PANEL_WIDTH_PX) + _GAP_PX
-
-    @property
-    def row_px(self) -> int:
-        return _CAPTION_HEIGHT_PX + self.height_px + _LEGEND_HEIGHT_PX
-
-    @property
-    def canvas_width_px(self) -> int:
-        return 2 * _MARGIN_PX + self.num_columns * self.pitch_px - _GAP_PX
-
-    @property
-    def canvas_height_px(self) -> int:
-        return _TITLE_HEIGHT_PX + self.num_rows * self.row_px
-
-    def corner(self, place: int) -> tuple[int, int]:
-        """Left and top of a panel with its caption."""
-        row, column = divmod(place, self.num_columns)
-        left_px = _MARGIN_PX + column * self.pitch_px
-        return left_px, _TITLE_HEIGHT_PX + row * self.row_px
-
-
-def _check_sizes(content: BeforeAfter) -> None:
-    shapes = [content.before.shape, content.after.shape]
     if content.truth is not None:
-        shapes.append(content.truth.shape)
-    if len(set(shapes)) > 1:
-        raise ValueError(f"maps of {content.name} differ in size: {shapes}.")
+        error = _error_panel(before, content.truth, "Error, initial")
+        panels.append(error._replace(scale=error_scale(), bar_panels=2))
+        panels.append(_error_panel(after, content.truth, "Error, refined"))
+    note = f"depth maps of {_size(before)}, filled {_filled(before)} → {_filled(after)}"
+    num_columns = 4 if content.truth is None else 3
+    return draw_panels(content.name, note, panels, num_columns, _LEAST_PANEL_PX)
 
 
-def _depth_panels(content: BeforeAfter, scale: DepthScale) -> list[_Panel]:
-    before, after = content.filled
+def thumbnails(content: BeforeAfter) -> Panel:
+    """Photo, initial and refined depth of an image, small, for the overview."""
     height_px, width_px = content.before.shape
-    return [
-        _Panel(content.rgb, "Photo", f"depth maps of {width_px} x {height_px} px"),
-        _Panel(scale.colored(content.before), "Initial depth", _filled_text(before)),
-        _Panel(scale.colored(content.after), "Refined depth", _filled_text(after)),
-    ]
+    tall_px = round(height_px * _THUMBNAIL_PX / width_px)
+    long_side_px = max(_THUMBNAIL_PX, min(tall_px, _TALLEST_THUMBNAIL_PX))
+    photo, before, after = content.pictures(long_side_px)
+    gap = np.full((photo.shape[0], _GAP_PX, 3), 255, np.uint8)
+    filled = f"{_filled(content.before)} → {_filled(content.after)}"
+    return Panel(
+        np.hstack([photo, gap, before, gap, after]),
+        content.name,
+        f"filled {filled}, median change {_median(content.difference)}",
+        content.scale.colors._replace(
+            ticks=[(0.0, "far"), (1.0, "near")],
+            label="each image by itself: the 2-98 % range of its refined inverse depth",
+        ),
+    )
 
 
-def _error_panels(content: BeforeAfter) -> list[_Panel]:
-    if content.truth is None:
-        return []
-    panels = []
-    for depth, title in ((content.before, "initial"), (content.after, "refined")):
-        error = np.abs(relative_difference(content.truth, depth))
-        known = content.truth > 0
-        bad = ~(error[known] <= _BAD_ERROR)  # holes are bad
-        share = float(bad.mean()) if bad.size else 0.0
-        detail = (
-            f"median {100 * _median(error):.2g} %, {100 * share:.0f} % off by > 2 %"
-        )
-        panels.append(_Panel(colored_error(error), f"Error, {title}", detail))
-    return panels
+def overview(title: str, images: Sequence[Panel], num_images: int) -> ColorImage:
+    """Draw a workspace: photo, initial and refined depth of some of its images.
+
+    Each image has its own colours (linear in inverse depth, near = red), because the
+    images of a workspace may be of different parts of the scene.
+
+    Args:
+        title: What the workspace is called.
+        images: The `thumbnails` of those to show.
+        num_images: How many there are in all.
+
+    Returns:
+        RGB values, shape (height, width, 3), uint8.
+    """
+    panels = [*(panel._replace(scale=None) for panel in images[:-1]), *images[-1:]]
+    shown = "photo | initial depth | refined depth"
+    note = f"{len(images)} of {num_images} images: {shown}"
+    num_columns = max(1, min(2, len(images)))
+    return draw_panels(title, note, panels, num_columns, _LEAST_BLOCK_PX)
 
 
-def _write_title(canvas: Canvas, content: BeforeAfter) -> None:
-    right_px = canvas.width_px - _MARGIN_PX
-    before, after = content.filled
-    text = f"filled {_percent(before)} → {_percent(after)}"
-    canvas.words(text, right_px, 13, size_px=16, align="right")
-    num_letters = (canvas.width_px - 2 * _MARGIN_PX - 240) // 12
-    name = shortened(content.name, num_letters)
-    canvas.words(name, _MARGIN_PX, 11, size_px=18, bold=True)
+def _error_panel(depth: DepthMap, truth: DepthMap, title: str) -> Panel:
+    error = np.abs(relative_difference(truth, depth))
+    bad = 100 * _share(~(error[truth > 0] <= _BAD_ERROR))  # holes are bad
+    detail = f"median {_median(error)}, {bad:.0f} % off by > 2 %"
+    size_px = fitted_size(depth.shape, _PANEL_PX)
+    return Panel(_shown(error, error_scale().colored, size_px), title, detail)
 
 
-def _draw_panel(canvas: Canvas, grid: _Grid, place: int, panel: _Panel) -> None:
-    left_px, top_px = grid.corner(place)
-    canvas.words(panel.title, left_px, top_px, bold=True)
-    canvas.words(panel.detail, left_px, top_px + 20, size_px=13, faint=True)
-    picture = resized(panel.picture, grid.height_px, grid.width_px)
-    canvas.picture(picture, left_px, top_px + _CAPTION_HEIGHT_PX)
+def _shown(
+    values: FloatMap,
+    colored: Callable[[FloatMap], ColorImage],
+    size_px: tuple[int, int],
+) -> ColorImage:
+    """A map in its colours. They are averaged, values are not: 0 or NaN is a hole."""
+    enough_px = (2 * size_px[0], 2 * size_px[1])
+    if enough_px < values.shape[::-1]:
+        values = nearest_resized(values, enough_px)
+    return resized(colored(values), size_px)
 
 
-def _draw_bars(canvas: Canvas, grid: _Grid, scale: DepthScale, limit: float) -> None:
-    depth = _Bar(DEPTH_COLORS, scale.ticks(), "depth in workspace units", "no depth")
-    _draw_bar(canvas, grid, (1, 2), depth)
-    percent = 100 * limit
-    ticks = [(0.0, f"-{percent:g} %"), (0.5, "0"), (1.0, f"+{percent:g} %")]
-    difference = _Bar(DIFFERENCE_COLORS, ticks, "nearer | farther", "was a hole")
-    _draw_bar(canvas, grid, (3, 3), difference)
-    if grid.num_rows > 1:
-        ticks = [(0.0, "0.1 %"), (0.5, "1 %"), (1.0, "10 %")]
-        hole = "no depth or no truth"
-        error = _Bar(ERROR_COLORS, ticks, "error, in percent of the depth", hole)
-        _draw_bar(canvas, grid, (4, 5), error)
+def _size(picture: ColorImage | DepthMap) -> str:
+    return f"{picture.shape[1]} x {picture.shape[0]} px"
 
 
-def _draw_bar(canvas: Canvas, grid: _Grid, places: tuple[int, int], bar: _Bar) -> None:
-    """A bar below the panels from the first to the last of these places."""
-    (left_px, top_px), (last_px, _) = map(grid.corner, places)
-    width_px = last_px + grid.width_px - left_px
-    top_px += _CAPTION_HEIGHT_PX + grid.height_px + 10
-    canvas.bar(bar.colors, bar.ticks, left_px, top_px, width_px)
-    words_px = top_px + BAR_HEIGHT_PX + BAR_LABEL_HEIGHT_PX + 2
-    canvas.words(bar.label, left_px, words_px, size_px=12, faint=True)
-    canvas.hole_legend(bar.hole, left_px + width_px, words_px)
+def _filled(depth: DepthMap) -> str:
+    return f"{100 * _share(depth > 0):.1f} %"
 
 
-def _filled_text(share: float) -> str:
-    return f"{_percent(share)} of the pixels filled"
+def _share(flags: npt.NDArray[np.bool_]) -> float:
+    return float(np.count_nonzero(flags) / max(flags.size, 1))
 
 
-def _percent(share: float) -> str:
-    return f"{100 * share:.1f} %"
-
-
-def _median(values: FloatMap) -> float:
-    present = values[np.isfinite(values)]
-    return float(np.median(present)) if present.size else 0.0
+def _median(relative: FloatMap) -> str:
+    """Median of the magnitudes in percent; 0 if all are NaN."""
+    present = np.abs(relative[np.isfinite(relative)])
+    return f"{100 * np.median(present) if present.size else 0:.2g} %"

@@ -7,15 +7,15 @@ from hypothesis import strategies as st
 
 from resdepth_colmap.scene import DepthMap
 from resdepth_colmap.viz.colormaps import (
-    ERROR_COLORS,
-    HOLE_COLOR,
     DepthScale,
-    color_bar,
-    colored_difference,
-    colored_error,
+    color_table,
     difference_limit,
+    difference_scale,
+    error_scale,
     relative_difference,
 )
+
+HOLE = (200, 200, 200)
 
 
 def _map(seed: int) -> DepthMap:
@@ -26,7 +26,7 @@ def _map(seed: int) -> DepthMap:
 def test_holes_and_only_holes_have_their_colour() -> None:
     depth = _map(0)
     depth[3, 4] = 0
-    is_hole = (DepthScale.of(depth).colored(depth) == HOLE_COLOR).all(axis=2)
+    is_hole = (DepthScale.of(depth).colored(depth) == HOLE).all(axis=2)
     assert is_hole.sum() == 1 and is_hole[3, 4]
 
 
@@ -101,14 +101,30 @@ def test_without_a_common_pixel_there_is_still_a_limit() -> None:
 
 def test_no_difference_is_white_and_signs_have_opposite_colours() -> None:
     difference = np.array([[0.0, -0.1, 0.1]], np.float32)
-    (none, nearer, farther) = colored_difference(difference, 0.1)[0].astype(int)
+    (none, nearer, farther) = difference_scale(difference).colored(difference)[0]
     assert none.min() > 240
     assert nearer[2] > nearer[0] and farther[0] > farther[2]
 
 
 def test_larger_errors_are_brighter() -> None:
     error = np.geomspace(1e-4, 1.0, 50, dtype=np.float32)[np.newaxis]
-    brightness = colored_error(error)[0].astype(int).sum(axis=1)
+    colors = error_scale().colored(error)[0]
+    brightness = colors.astype(int).sum(axis=1)
     assert (np.diff(brightness) >= 0).all() and brightness[-1] > 600
-    bar = color_bar(ERROR_COLORS, 50, 3)
-    assert bar.shape == (3, 50, 3) and (bar[0, -1] == colored_error(error)[0, -1]).all()
+    table = color_table(error_scale().colors)
+    assert table.shape == (256, 3)
+    np.testing.assert_allclose(table[-1], colors[-1].astype(int), atol=1)  # rounding
+
+
+def test_no_error_at_all_is_dark_and_not_a_hole() -> None:
+    zero, hole = error_scale().colored(np.array([[0.0, np.nan]], np.float32))[0]
+    assert zero.max() < 10 and tuple(hole) == HOLE
+
+
+@pytest.mark.parametrize("limit", [0.001, 0.02, 0.5])
+def test_the_ends_of_the_bar_have_the_limit_of_the_difference(limit: float) -> None:
+    scale = difference_scale(np.full((2, 2), limit, np.float32))
+    assert [float(scale.norm.inverse(unit)) for unit, _ in scale.ticks] == (
+        pytest.approx([-limit, 0, limit])
+    )
+    assert scale.ticks[-1][1] == f"+{100 * limit:g} %"
