@@ -6,8 +6,7 @@ from pathlib import Path
 import numpy as np
 from planes import PlaneView, write_plane_workspace
 
-from resdepth_colmap.io.colmap.depth_map import write_depth_map
-from resdepth_colmap.io.colmap.normal_map import write_normal_map
+from resdepth_colmap.io.colmap.maps import write_depth_map, write_normal_map
 from resdepth_colmap.io.colmap.output import OutputWorkspace
 from resdepth_colmap.io.colmap.workspace import open_workspace
 from resdepth_colmap.scene import DepthMap

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from planes import write_plane_workspace
 
-from resdepth_colmap.io.colmap.depth_map import write_depth_map
+from resdepth_colmap.io.colmap.maps import write_depth_map
 
 
 def write_noisy_plane(

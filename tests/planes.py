@@ -8,8 +8,7 @@ import numpy.typing as npt
 import pycolmap
 from PIL import Image
 
-from resdepth_colmap.io.colmap.depth_map import write_depth_map
-from resdepth_colmap.io.colmap.normal_map import write_normal_map
+from resdepth_colmap.io.colmap.maps import write_depth_map, write_normal_map
 from resdepth_colmap.scene import Camera, ColorImage, DepthMap, Matrix, NormalMap, View
 
 # The plane: normal @ xyz_in_world = OFFSET; the normal points at the cameras.

@@ -14,7 +14,7 @@ from planes import (
     write_model,
 )
 
-from resdepth_colmap.io.colmap.depth_map import write_depth_map
+from resdepth_colmap.io.colmap.maps import write_depth_map
 from resdepth_colmap.io.colmap.output import OutputWorkspace, write_record
 from resdepth_colmap.io.colmap.workspace import open_workspace
 from resdepth_colmap.io.point_cloud import PointCloud, write_cloud

@@ -8,7 +8,7 @@ from analytic_scene import depth_of_plane, image_of, view_at
 from PIL import Image
 from planes import PlaneView, plane_views, write_model
 
-from resdepth_colmap.io.colmap.depth_map import write_depth_map
+from resdepth_colmap.io.colmap.maps import write_depth_map
 from resdepth_colmap.io.exported_map import write_pfm
 from resdepth_colmap.scene import Camera, DepthMap, FloatMap
 

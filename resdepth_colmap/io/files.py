@@ -61,6 +61,26 @@ def whole_file(path: Path) -> Iterator[Path]:
             partial.unlink()
 
 
+@contextlib.contextmanager
+def reading(path: Path) -> Iterator[None]:
+    """Make an OSError in the block a WorkspaceError that names the file."""
+    try:
+        yield
+    except WorkspaceError:
+        raise
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise WorkspaceError(f"{path}: cannot be read ({reason}).") from error
+
+
+def read_text(path: Path) -> str:
+    """The text of a file; WorkspaceError if it cannot be read, or is not UTF-8."""
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise WorkspaceError(f"{path}: cannot be read as text in UTF-8.") from error
+
+
 def link_or_copy(source: Path, target: Path) -> None:
     """Make `target` show the content of `source` at the least cost.
 

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from resdepth_colmap.errors import WorkspaceError
+from resdepth_colmap.io.files import reading
 from resdepth_colmap.scene import FloatMap
 
 _HEADER = re.compile(rb"(P[fF])\s+(\d{1,9})\s+(\d{1,9})\s+(-?[0-9.eE+-]+)\s")
@@ -21,11 +22,8 @@ def read_pfm(path: Path) -> FloatMap:
     Raises:
         WorkspaceError: If the file is not there, no grey PFM, or truncated.
     """
-    try:
+    with reading(path):
         data = path.read_bytes()
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise WorkspaceError(f"{path}: cannot read it ({reason}).") from error
     match = _HEADER.match(data[:_LONGEST_HEADER])
     if match is None or match[1] != b"Pf":
         raise WorkspaceError(

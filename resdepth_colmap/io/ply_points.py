@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from resdepth_colmap.errors import WorkspaceError
+from resdepth_colmap.io.files import reading
 
 _BYTE_ORDERS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
 _TYPES = {
@@ -55,17 +56,14 @@ def read_ply_points(path: Path) -> npt.NDArray[np.float32]:
         WorkspaceError: If the file is not there, is no PLY, or holds less than its
             header says.
     """
+    if not path.exists():
+        raise WorkspaceError(f"{path}: no such file.")
     try:
-        with path.open("rb") as file:
+        with reading(path), path.open("rb") as file:
             kind, elements = _read_header(file)
             before, vertices = _split_at_vertices(elements)
             read = _read_text if kind == "ascii" else _read_binary
             values = read(file, before, vertices, _BYTE_ORDERS[kind])
-    except FileNotFoundError as error:
-        raise WorkspaceError(f"{path}: no such file.") from error
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise WorkspaceError(f"{path}: cannot be read ({reason}).") from error
     except ValueError as error:
         raise WorkspaceError(
             f"{path}: {error}; is it a PLY file, and was it copied as a whole?"

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from resdepth_colmap.errors import WorkspaceError
+from resdepth_colmap.io.files import reading
 
 logger = logging.getLogger(__name__)
 
@@ -48,10 +49,8 @@ def read_scan_alignment(path: Path) -> tuple[AlignedScan, ...]:
             no file or no rigid matrix, or if there is no scan.
     """
     try:
-        root = ElementTree.parse(path).getroot()
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise WorkspaceError(f"{path}: cannot be read ({reason}).") from error
+        with reading(path):
+            root = ElementTree.parse(path).getroot()
     except (ElementTree.ParseError, ValueError, LookupError) as error:
         raise WorkspaceError(
             f"{path}: not a MeshLab project, which is XML ({error}); "

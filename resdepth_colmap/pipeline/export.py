@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.io.colmap.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.maps import read_depth_map
 from resdepth_colmap.io.colmap.model import read_scene
 from resdepth_colmap.io.colmap.output import OutputWorkspace, write_record
 from resdepth_colmap.io.colmap.workspace import Workspace

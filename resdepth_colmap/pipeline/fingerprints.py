@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.io.colmap.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.maps import read_depth_map
 
 
 class MapFacts(NamedTuple):

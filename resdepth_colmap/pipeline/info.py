@@ -9,7 +9,7 @@ import numpy as np
 
 from resdepth_colmap.config import RefineConfig, StereoBackend, StereoConfig
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.io.colmap.depth_map import read_depth_map, read_map_size
+from resdepth_colmap.io.colmap.maps import read_depth_map, read_map_size
 from resdepth_colmap.io.colmap.output import OutputWorkspace
 from resdepth_colmap.io.colmap.workspace import Workspace, missing_images
 from resdepth_colmap.pipeline.initial_map import (

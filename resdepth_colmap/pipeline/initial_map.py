@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.io.colmap.depth_map import read_map_size
+from resdepth_colmap.io.colmap.maps import read_map_size
 from resdepth_colmap.io.colmap.workspace import Workspace, original_map_path
 from resdepth_colmap.pipeline.fingerprints import Fingerprints
 from resdepth_colmap.scene import Camera, Scene

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from resdepth_colmap.geometry.resize import nearest_resized
-from resdepth_colmap.io.colmap.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.maps import read_depth_map
 from resdepth_colmap.io.colmap.output import OutputWorkspace
 from resdepth_colmap.io.files import safe_name
 from resdepth_colmap.io.images import read_rgb, write_png

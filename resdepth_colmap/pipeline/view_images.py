@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from resdepth_colmap.geometry.resize import area_resized, nearest_resized
-from resdepth_colmap.io.colmap.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.maps import read_depth_map
 from resdepth_colmap.io.colmap.workspace import Workspace, original_map_path
 from resdepth_colmap.io.images import read_gray, read_unit_colors
 from resdepth_colmap.scene import (

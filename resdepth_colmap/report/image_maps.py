@@ -9,7 +9,7 @@ from typing import NamedTuple
 from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.evaluation.metrics.depth_metrics import DepthMetrics, depth_metrics
 from resdepth_colmap.geometry.resize import nearest_resized
-from resdepth_colmap.io.colmap.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.maps import read_depth_map
 from resdepth_colmap.io.colmap.output import OutputWorkspace
 from resdepth_colmap.io.images import read_rgb
 from resdepth_colmap.pipeline.initial_map import map_path

@@ -11,7 +11,7 @@ import pycolmap
 
 from resdepth_colmap.config import SynthesisConfig
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.io.colmap.depth_map import write_depth_map
+from resdepth_colmap.io.colmap.maps import write_depth_map
 from resdepth_colmap.io.images import write_png
 from resdepth_colmap.scene import ColorImage, DepthMap, View
 from resdepth_colmap.synthetic.render import Tracer

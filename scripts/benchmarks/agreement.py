@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from resdepth_colmap.config import RefineConfig
-from resdepth_colmap.io.colmap.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.maps import read_depth_map
 from resdepth_colmap.io.colmap.workspace import open_workspace
 from resdepth_colmap.network.weights import weights_hash
 from resdepth_colmap.pipeline.refine.stage import refine_workspace

@@ -17,7 +17,7 @@ from resdepth_colmap.evaluation.datasets.workspaces import (
 )
 from resdepth_colmap.evaluation.depth.match_cache import MatchCache
 from resdepth_colmap.evaluation.depth.sample_matching import initial_depth
-from resdepth_colmap.io.colmap.depth_map import write_depth_map
+from resdepth_colmap.io.colmap.maps import write_depth_map
 from resdepth_colmap.io.colmap.workspace import open_workspace
 from resdepth_colmap.matching.patch_match import MatchView
 from resdepth_colmap.pipeline.pictures import FOLDER, draw_workspace

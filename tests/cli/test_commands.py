@@ -11,8 +11,7 @@ from planes import NAMES, NORMAL, OFFSET
 from workspaces import identity_weights, plane_folder
 
 from resdepth_colmap.cli.main import main
-from resdepth_colmap.io.colmap.depth_map import read_depth_map
-from resdepth_colmap.io.colmap.normal_map import read_normal_map
+from resdepth_colmap.io.colmap.maps import read_depth_map, read_normal_map
 from resdepth_colmap.io.point_cloud import read_cloud
 
 

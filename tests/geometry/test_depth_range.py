@@ -9,7 +9,7 @@ from analytic_scene import CAMERA, view_at
 from resdepth_colmap.geometry.depth_range import depth_range
 from resdepth_colmap.geometry.projection import transform
 from resdepth_colmap.geometry.view_selection import choose_sources
-from resdepth_colmap.io.colmap.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.maps import read_depth_map
 from resdepth_colmap.io.colmap.model import read_scene
 from resdepth_colmap.io.colmap.workspace import Workspace, open_workspace
 from resdepth_colmap.scene import Scene

@@ -12,7 +12,7 @@ from workspaces import identity_weights, plane_folder
 
 from resdepth_colmap.config import RefineConfig
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.io.colmap.depth_map import read_depth_map, write_depth_map
+from resdepth_colmap.io.colmap.maps import read_depth_map, write_depth_map
 from resdepth_colmap.io.colmap.workspace import open_workspace
 from resdepth_colmap.pipeline.export import export_maps
 from resdepth_colmap.pipeline.export_config import MapFormat

@@ -11,7 +11,7 @@ from workspaces import identity_weights, plane_folder
 
 from resdepth_colmap.config import FuseConfig, Fuser, RefineConfig
 from resdepth_colmap.errors import FusionError
-from resdepth_colmap.io.colmap.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.maps import read_depth_map
 from resdepth_colmap.io.colmap.model import read_scene
 from resdepth_colmap.io.colmap.workspace import open_workspace
 from resdepth_colmap.io.point_cloud import read_cloud

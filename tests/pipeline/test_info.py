@@ -9,7 +9,7 @@ from planes import NAMES
 from workspaces import identity_weights, plane_folder
 
 from resdepth_colmap.config import RefineConfig, StereoBackend
-from resdepth_colmap.io.colmap.depth_map import read_depth_map, write_depth_map
+from resdepth_colmap.io.colmap.maps import read_depth_map, write_depth_map
 from resdepth_colmap.io.colmap.model import read_scene
 from resdepth_colmap.io.colmap.workspace import open_workspace
 from resdepth_colmap.pipeline.info import Inspection, inspect_workspace

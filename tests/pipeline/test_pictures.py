@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from planes import NAMES, write_plane_workspace
 
-from resdepth_colmap.io.colmap.depth_map import write_depth_map
+from resdepth_colmap.io.colmap.maps import write_depth_map
 from resdepth_colmap.io.colmap.model import read_scene
 from resdepth_colmap.io.colmap.output import OutputWorkspace
 from resdepth_colmap.io.colmap.workspace import open_workspace

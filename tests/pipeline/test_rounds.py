@@ -12,7 +12,7 @@ from refined_plane import network
 from workspaces import plane_folder
 
 from resdepth_colmap.config import RefineConfig
-from resdepth_colmap.io.colmap.depth_map import read_depth_map, write_depth_map
+from resdepth_colmap.io.colmap.maps import read_depth_map, write_depth_map
 from resdepth_colmap.io.colmap.model import read_scene
 from resdepth_colmap.io.colmap.workspace import open_workspace
 from resdepth_colmap.network.weights import load_weights, save_weights

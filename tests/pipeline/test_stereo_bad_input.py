@@ -13,7 +13,7 @@ from workspaces import plane_folder
 
 from resdepth_colmap.cli.main import main
 from resdepth_colmap.config import StereoBackend, StereoConfig
-from resdepth_colmap.io.colmap.map_file import read_planes
+from resdepth_colmap.io.colmap.maps import read_planes
 from resdepth_colmap.io.colmap.model import read_scene
 from resdepth_colmap.io.colmap.workspace import check_images, open_workspace
 from resdepth_colmap.pipeline.stereo.stage import StereoReport, stereo_workspace

@@ -13,9 +13,8 @@ from workspaces import plane_folder
 from resdepth_colmap.config import StereoBackend, StereoConfig
 from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.io.colmap.cfg import read_sources
-from resdepth_colmap.io.colmap.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.maps import read_depth_map, read_normal_map
 from resdepth_colmap.io.colmap.model import read_image_indices, read_scene
-from resdepth_colmap.io.colmap.normal_map import read_normal_map
 from resdepth_colmap.io.colmap.workspace import Workspace, open_workspace
 from resdepth_colmap.pipeline.stereo.stage import StereoReport, stereo_workspace
 from resdepth_colmap.scene import Scene

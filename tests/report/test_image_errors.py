@@ -8,7 +8,7 @@ from planes import NAMES
 from workspaces import identity_weights, plane_folder
 
 from resdepth_colmap.config import RefineConfig
-from resdepth_colmap.io.colmap.depth_map import read_depth_map, write_depth_map
+from resdepth_colmap.io.colmap.maps import read_depth_map, write_depth_map
 from resdepth_colmap.io.colmap.output import OutputWorkspace
 from resdepth_colmap.io.colmap.workspace import open_workspace
 from resdepth_colmap.pipeline.refine.stage import refine_workspace

@@ -10,7 +10,7 @@ from planes import NAMES, plane_views
 from report_workspaces import initial_depth, refined_workspace
 
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.io.colmap.depth_map import write_depth_map
+from resdepth_colmap.io.colmap.maps import write_depth_map
 from resdepth_colmap.io.colmap.output import OutputWorkspace
 from resdepth_colmap.io.colmap.workspace import open_workspace
 from resdepth_colmap.report.image_maps import load_maps, smaller_size

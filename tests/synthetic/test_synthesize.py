@@ -8,7 +8,7 @@ import pytest
 
 from resdepth_colmap.config import SynthesisConfig
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.io.colmap.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.maps import read_depth_map
 from resdepth_colmap.io.images import read_rgb
 from resdepth_colmap.scene import DepthMap, Matrix, View
 from resdepth_colmap.synthetic.room import Style

@@ -11,7 +11,7 @@ from noisy_planes import write_noisy_plane
 from planes import write_plane_workspace
 
 from resdepth_colmap.errors import TrainingError, WorkspaceError
-from resdepth_colmap.io.colmap.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.maps import read_depth_map
 from resdepth_colmap.network.network_config import NetworkConfig
 from resdepth_colmap.network.weights import load_weights, save_weights
 from resdepth_colmap.training.config import Precision, TrainConfig

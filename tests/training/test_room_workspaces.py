@@ -12,7 +12,7 @@ from rendered_rooms import CONFIG, OTHER_SEED, SEED, rendered
 from resdepth_colmap.config import SynthesisConfig
 from resdepth_colmap.geometry.pixels import index_K
 from resdepth_colmap.geometry.projection import back_project, project, transform
-from resdepth_colmap.io.colmap.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.maps import read_depth_map
 from resdepth_colmap.io.colmap.model import read_scene
 from resdepth_colmap.io.colmap.workspace import check_images, open_workspace
 from resdepth_colmap.io.images import read_rgb

@@ -19,7 +19,7 @@ from resdepth_colmap.evaluation.cloud.voxel_mean import VoxelGrids
 from resdepth_colmap.evaluation.datasets.workspaces import TRUTH_FOLDER
 from resdepth_colmap.geometry.pixels import index_K
 from resdepth_colmap.geometry.projection import back_project, look_up, transform
-from resdepth_colmap.io.colmap.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.maps import read_depth_map
 from resdepth_colmap.io.colmap.workspace import Workspace
 from resdepth_colmap.pipeline.initial_map import check_map_size
 from resdepth_colmap.progress import Progress

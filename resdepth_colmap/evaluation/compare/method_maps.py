@@ -8,7 +8,7 @@ from resdepth_colmap.evaluation.compare.methods import Method
 from resdepth_colmap.evaluation.metrics.view_maps import ViewMaps
 from resdepth_colmap.geometry.pixels import index_K
 from resdepth_colmap.geometry.resize import nearest_resized
-from resdepth_colmap.io.colmap.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.maps import read_depth_map
 from resdepth_colmap.pipeline.fuse.views import MapFiles
 from resdepth_colmap.pipeline.view_images import ArrayCache
 from resdepth_colmap.scene import DepthMap

@@ -17,6 +17,7 @@ from resdepth_colmap.geometry.view_selection import (
     SourceChoice,
     choose_sources,
 )
+from resdepth_colmap.io.files import read_text
 from resdepth_colmap.scene import Scene
 
 PAIRS_NAME = "pairs.txt"
@@ -82,12 +83,8 @@ def read_pairs(path: Path) -> dict[str, list[tuple[str, str]]]:
     Raises:
         WorkspaceError: If it cannot be read, or a line does not have three words.
     """
-    try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise WorkspaceError(f"{path}: cannot be read as text in UTF-8.") from error
     pairs: dict[str, list[tuple[str, str]]] = {}
-    for line_number, line in enumerate(lines, 1):
+    for line_number, line in enumerate(read_text(path).splitlines(), 1):
         words = line.partition("#")[0].split()
         if not words:
             continue

@@ -18,6 +18,7 @@ from resdepth_colmap.evaluation.datasets.sample import (
     LazySample,
     SampleOptions,
 )
+from resdepth_colmap.io.files import read_text
 from resdepth_colmap.io.images import read_gray, read_unit_colors
 from resdepth_colmap.io.pfm import read_pfm
 from resdepth_colmap.matching.patch_match import MatchView
@@ -93,12 +94,8 @@ def read_calibration(path: Path) -> dict[str, tuple[float, ...]]:
     Raises:
         WorkspaceError: If it cannot be read, or a required entry is missing.
     """
-    try:
-        lines = path.read_text(encoding="ascii").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise WorkspaceError(f"{path}: cannot read it as text.") from error
     entries = {}
-    for line_number, line in enumerate(lines, 1):
+    for line_number, line in enumerate(read_text(path).splitlines(), 1):
         match = _LINE.fullmatch(line)
         if match is None:
             continue

@@ -19,7 +19,7 @@ from resdepth_colmap.geometry.pixels import index_K
 from resdepth_colmap.geometry.resize import nearest_resized
 from resdepth_colmap.geometry.view_selection import choose_sources
 from resdepth_colmap.io.colmap.cfg import SourceKind, read_sources
-from resdepth_colmap.io.colmap.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.maps import read_depth_map
 from resdepth_colmap.io.colmap.model import read_scene
 from resdepth_colmap.io.colmap.workspace import Workspace, check_images, open_workspace
 from resdepth_colmap.io.images import read_gray

@@ -15,7 +15,7 @@ from resdepth_colmap.io.colmap.cfg import (
     SourceSpec,
     write_patch_match_cfg,
 )
-from resdepth_colmap.io.colmap.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.maps import read_depth_map
 from resdepth_colmap.io.files import write_whole
 from resdepth_colmap.io.png import encode_png
 from resdepth_colmap.matching.patch_match import MatchView

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.io.files import write_whole
+from resdepth_colmap.io.files import reading, write_whole
 
 _SEPARATOR = re.compile("[,;]")
 
@@ -121,10 +121,8 @@ def _format(spec: SourceSpec) -> str:
 def _lines(path: Path) -> Iterator[tuple[int, str]]:
     """The lines that say something, with their numbers."""
     try:
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise WorkspaceError(f"{path}: cannot read it ({reason}).") from error
+        with reading(path):
+            text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
         number = error.object[: error.start].count(b"\n") + 1
         raise WorkspaceError(f"{path}, line {number}: not text in UTF-8.") from error

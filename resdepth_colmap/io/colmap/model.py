@@ -12,10 +12,11 @@ import numpy.typing as npt
 import pycolmap
 
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.io.colmap.model_file import find_model, names_in_text
 from resdepth_colmap.io.colmap.reconstruction import (
     PYCOLMAP_ERRORS,
     broken_model,
+    find_model,
+    names_in_text,
     open_reconstruction,
     quiet_pycolmap,
 )

@@ -16,15 +16,20 @@ from resdepth_colmap.io.colmap.cfg import (
     write_fusion_cfg,
     write_patch_match_cfg,
 )
-from resdepth_colmap.io.colmap.depth_map import write_depth_map
-from resdepth_colmap.io.colmap.model_file import MODEL_PARTS
-from resdepth_colmap.io.colmap.normal_map import write_normal_map
+from resdepth_colmap.io.colmap.maps import write_depth_map, write_normal_map
+from resdepth_colmap.io.colmap.reconstruction import MODEL_PARTS
 from resdepth_colmap.io.colmap.workspace import (
     ORIGINAL_SUFFIX,
     OUTPUT_FOLDER,
     Workspace,
 )
-from resdepth_colmap.io.files import link_or_copy, safe_name, whole_file, write_whole
+from resdepth_colmap.io.files import (
+    link_or_copy,
+    reading,
+    safe_name,
+    whole_file,
+    write_whole,
+)
 from resdepth_colmap.scene import DepthMap, FloatMap, NormalMap
 
 KIND = "geometric"
@@ -177,12 +182,10 @@ def read_record(path: Path) -> dict[str, Any]:
         WorkspaceError: If the file is no JSON object.
     """
     try:
-        record = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        return {}
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise WorkspaceError(f"{path}: cannot read it ({reason}).") from error
+        with reading(path):
+            if not path.exists():
+                return {}
+            record = json.loads(path.read_text(encoding="utf-8"))
     except (ValueError, RecursionError) as error:
         raise _no_record(path, str(error)) from error
     if not isinstance(record, dict):

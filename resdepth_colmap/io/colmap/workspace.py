@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.io.colmap.model_file import find_model
+from resdepth_colmap.io.colmap.reconstruction import find_model
 from resdepth_colmap.io.files import safe_name
 from resdepth_colmap.io.images import image_size
 from resdepth_colmap.scene import Scene

@@ -10,7 +10,7 @@ import numpy as np
 
 from resdepth_colmap.config import FuseConfig
 from resdepth_colmap.errors import FusionError
-from resdepth_colmap.io.colmap.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.maps import read_depth_map
 from resdepth_colmap.io.colmap.output import KIND
 from resdepth_colmap.io.colmap.workspace import Workspace
 from resdepth_colmap.io.point_cloud import PointCloud, read_cloud

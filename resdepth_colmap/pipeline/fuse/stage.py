@@ -13,7 +13,7 @@ import numpy as np
 from resdepth_colmap.config import FuseConfig, Fuser
 from resdepth_colmap.errors import ConfigError, FusionError
 from resdepth_colmap.geometry.view_selection import choose_sources
-from resdepth_colmap.io.colmap.depth_map import read_map_size
+from resdepth_colmap.io.colmap.maps import read_map_size
 from resdepth_colmap.io.colmap.output import OutputWorkspace
 from resdepth_colmap.io.colmap.workspace import Workspace
 from resdepth_colmap.io.open3d_library import load_open3d

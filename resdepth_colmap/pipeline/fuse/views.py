@@ -13,8 +13,7 @@ from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.geometry.normals import normals_from_depth
 from resdepth_colmap.geometry.pixels import index_K
 from resdepth_colmap.geometry.resize import area_resized
-from resdepth_colmap.io.colmap.depth_map import read_depth_map
-from resdepth_colmap.io.colmap.normal_map import read_normal_map
+from resdepth_colmap.io.colmap.maps import read_depth_map, read_normal_map
 from resdepth_colmap.io.images import read_rgb
 from resdepth_colmap.scene import (
     ColorImage,

@@ -9,7 +9,7 @@ import numpy as np
 
 from resdepth_colmap.config import RefineConfig
 from resdepth_colmap.geometry.view_selection import SourceChoice
-from resdepth_colmap.io.colmap.depth_map import write_depth_map
+from resdepth_colmap.io.colmap.maps import write_depth_map
 from resdepth_colmap.io.colmap.output import OutputWorkspace
 from resdepth_colmap.network.unet import ResDepthNet
 from resdepth_colmap.pipeline.manifest import Manifest

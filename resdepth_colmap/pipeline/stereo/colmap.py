@@ -15,9 +15,13 @@ from resdepth_colmap.io.colmap.cfg import (
     SourceSpec,
     write_patch_match_cfg,
 )
-from resdepth_colmap.io.colmap.depth_map import read_depth_map, write_depth_map
+from resdepth_colmap.io.colmap.maps import (
+    read_depth_map,
+    read_normal_map,
+    write_depth_map,
+    write_normal_map,
+)
 from resdepth_colmap.io.colmap.masks import mask_file, read_mask
-from resdepth_colmap.io.colmap.normal_map import read_normal_map, write_normal_map
 from resdepth_colmap.io.colmap.workspace import Workspace
 from resdepth_colmap.pipeline.stereo.passes import GEOMETRIC, PHOTOMETRIC
 from resdepth_colmap.pipeline.stereo.plan import plan_stereo

@@ -9,8 +9,8 @@ from resdepth_colmap.geometry.holes import fill_holes
 from resdepth_colmap.geometry.normals import normals_from_depth
 from resdepth_colmap.geometry.pixels import index_K
 from resdepth_colmap.geometry.resize import nearest_resized
+from resdepth_colmap.io.colmap.maps import read_normal_map
 from resdepth_colmap.io.colmap.masks import Wanted, mask_file, read_mask
-from resdepth_colmap.io.colmap.normal_map import read_normal_map
 from resdepth_colmap.io.colmap.workspace import Workspace
 from resdepth_colmap.matching.patch_match import MatchView, Surface
 from resdepth_colmap.pipeline.stereo.depth_range_probe import PROBE_SIDE_PX, is_wide

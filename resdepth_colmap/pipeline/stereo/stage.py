@@ -6,11 +6,13 @@ import logging
 
 from resdepth_colmap.config import StereoBackend, StereoConfig
 from resdepth_colmap.errors import BackendUnavailableError, WorkspaceError
-from resdepth_colmap.io.colmap.consistency_graph import write_consistency_graph
-from resdepth_colmap.io.colmap.depth_map import write_depth_map
+from resdepth_colmap.io.colmap.maps import (
+    write_consistency_graph,
+    write_depth_map,
+    write_normal_map,
+)
 from resdepth_colmap.io.colmap.masks import check_masks
 from resdepth_colmap.io.colmap.model import read_image_indices
-from resdepth_colmap.io.colmap.normal_map import write_normal_map
 from resdepth_colmap.io.colmap.workspace import Workspace
 from resdepth_colmap.pipeline.manifest import Manifest
 from resdepth_colmap.pipeline.stereo.colmap import run_colmap

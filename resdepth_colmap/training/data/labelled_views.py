@@ -15,7 +15,7 @@ import numpy as np
 from resdepth_colmap.config import StereoConfig
 from resdepth_colmap.geometry.resize import nearest_resized
 from resdepth_colmap.geometry.view_selection import choose_sources
-from resdepth_colmap.io.colmap.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.maps import read_depth_map
 from resdepth_colmap.io.colmap.model import read_scene
 from resdepth_colmap.io.colmap.workspace import Workspace, open_workspace
 from resdepth_colmap.pipeline.initial_map import (

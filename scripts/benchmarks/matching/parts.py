@@ -14,7 +14,7 @@ from resdepth_colmap.evaluation.cloud.reference_cloud import read_reference_clou
 from resdepth_colmap.evaluation.datasets.workspaces import SEEN_SUFFIX, TRUTH_FOLDER
 from resdepth_colmap.evaluation.metrics.depth_metrics import depth_metrics
 from resdepth_colmap.io.colmap.cfg import SourceKind, SourceSpec
-from resdepth_colmap.io.colmap.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.maps import read_depth_map
 from resdepth_colmap.io.colmap.workspace import open_workspace
 from resdepth_colmap.io.images import read_gray
 from resdepth_colmap.pipeline.fuse.colmap import fuse_with_colmap

@@ -11,7 +11,7 @@ from typing import Any
 
 from resdepth_colmap.config import StereoConfig
 from resdepth_colmap.io.colmap.cfg import SourceKind, SourceSpec
-from resdepth_colmap.io.colmap.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.maps import read_depth_map
 from resdepth_colmap.io.colmap.workspace import Workspace
 from resdepth_colmap.scene import DepthMap
 from scripts.benchmarks.matching.matched_workspace import MatchedWorkspace

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from resdepth_colmap.config import StereoConfig
-from resdepth_colmap.io.colmap.depth_map import write_depth_map
+from resdepth_colmap.io.colmap.maps import write_depth_map
 from resdepth_colmap.io.files import link_or_copy
 from resdepth_colmap.network.unet import ResDepthNet
 from resdepth_colmap.pipeline.initial_map import choose_initial_map

@@ -12,7 +12,7 @@ from resdepth_colmap.evaluation.cloud.reference_cloud import (
     ReferenceCloud,
     read_reference_cloud,
 )
-from resdepth_colmap.io.colmap.depth_map import write_depth_map
+from resdepth_colmap.io.colmap.maps import write_depth_map
 from resdepth_colmap.io.colmap.model import read_scene
 from resdepth_colmap.io.colmap.workspace import open_workspace
 from resdepth_colmap.progress import SilentProgress

@@ -19,7 +19,7 @@ from resdepth_colmap.config import StereoConfig
 from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.evaluation.datasets.sample import DepthSample, SampleOptions
 from resdepth_colmap.evaluation.datasets.workspaces import read_workspace_samples
-from resdepth_colmap.io.colmap.depth_map import write_depth_map
+from resdepth_colmap.io.colmap.maps import write_depth_map
 from resdepth_colmap.pipeline.refine.cross_view import NUM_SOURCE_MAPS
 
 OPTIONS = SampleOptions(stereo=StereoConfig(max_num_sources=3), num_sources=1)

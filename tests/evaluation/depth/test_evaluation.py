@@ -26,7 +26,7 @@ from resdepth_colmap.evaluation.depth.evaluation import (
 )
 from resdepth_colmap.evaluation.depth.match_cache import MatchCache
 from resdepth_colmap.evaluation.depth.result import DepthReport, SceneResult
-from resdepth_colmap.io.colmap.depth_map import write_depth_map
+from resdepth_colmap.io.colmap.maps import write_depth_map
 from resdepth_colmap.network.weights import weights_hash
 from resdepth_colmap.scene import DepthMap
 

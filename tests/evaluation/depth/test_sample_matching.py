@@ -19,7 +19,7 @@ from resdepth_colmap.evaluation.depth.sample_matching import (
 )
 from resdepth_colmap.geometry.pixels import index_K
 from resdepth_colmap.io.colmap.cfg import SourceKind, read_sources
-from resdepth_colmap.io.colmap.depth_map import write_depth_map
+from resdepth_colmap.io.colmap.maps import write_depth_map
 from resdepth_colmap.io.colmap.model import read_scene
 from resdepth_colmap.io.colmap.workspace import check_images, open_workspace
 from resdepth_colmap.io.images import read_gray

@@ -13,7 +13,7 @@ from resdepth_colmap.config import RefineConfig
 from resdepth_colmap.evaluation.datasets.sample import DepthSample, InitialDepth
 from resdepth_colmap.evaluation.depth.sample_refinement import refine_sample
 from resdepth_colmap.geometry.pixels import index_K
-from resdepth_colmap.io.colmap.depth_map import read_depth_map, write_depth_map
+from resdepth_colmap.io.colmap.maps import read_depth_map, write_depth_map
 from resdepth_colmap.io.colmap.workspace import open_workspace
 from resdepth_colmap.matching.patch_match import MatchView
 from resdepth_colmap.network.unet import ResDepthNet

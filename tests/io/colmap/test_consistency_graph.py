@@ -7,7 +7,7 @@ import numpy.typing as npt
 from hypothesis import given
 from hypothesis import strategies as st
 
-from resdepth_colmap.io.colmap.consistency_graph import write_consistency_graph
+from resdepth_colmap.io.colmap.maps import write_consistency_graph
 
 
 def as_colmap_reads(

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.io.colmap.depth_map import (
+from resdepth_colmap.io.colmap.maps import (
     read_depth_map,
     read_map_size,
     write_depth_map,

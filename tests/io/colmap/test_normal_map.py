@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.io.colmap.normal_map import read_normal_map, write_normal_map
+from resdepth_colmap.io.colmap.maps import read_normal_map, write_normal_map
 
 
 def _f32(values: object) -> npt.NDArray[np.float32]:

@@ -9,8 +9,7 @@ from planes import NAMES, NORMAL, OFFSET, PlaneView, write_plane_workspace
 
 from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.io.colmap.cfg import read_fusion_cfg, read_sources
-from resdepth_colmap.io.colmap.depth_map import read_depth_map
-from resdepth_colmap.io.colmap.normal_map import read_normal_map
+from resdepth_colmap.io.colmap.maps import read_depth_map, read_normal_map
 from resdepth_colmap.io.colmap.output import OutputWorkspace, read_record, write_record
 from resdepth_colmap.io.colmap.workspace import open_workspace, original_map_path
 from resdepth_colmap.io.point_cloud import read_cloud

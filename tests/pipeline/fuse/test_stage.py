@@ -16,7 +16,7 @@ from fusion_scene import (
 
 from resdepth_colmap.config import FuseConfig, Fuser
 from resdepth_colmap.errors import ConfigError, FusionError, WorkspaceError
-from resdepth_colmap.io.colmap.depth_map import write_depth_map
+from resdepth_colmap.io.colmap.maps import write_depth_map
 from resdepth_colmap.io.colmap.output import OutputWorkspace
 from resdepth_colmap.io.colmap.workspace import Workspace
 from resdepth_colmap.io.images import write_png

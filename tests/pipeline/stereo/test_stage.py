@@ -15,7 +15,7 @@ from workspaces import identity_weights, plane_folder
 from resdepth_colmap.cli.main import main
 from resdepth_colmap.config import StereoBackend, StereoConfig
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.io.colmap.depth_map import read_depth_map, write_depth_map
+from resdepth_colmap.io.colmap.maps import read_depth_map, write_depth_map
 from resdepth_colmap.io.colmap.model import read_scene
 from resdepth_colmap.io.colmap.workspace import Workspace, open_workspace
 from resdepth_colmap.pipeline.stereo import passes as stereo_passes

@@ -10,7 +10,7 @@ from planes import NAMES
 from workspaces import plane_folder
 
 from resdepth_colmap.config import StereoBackend, StereoConfig
-from resdepth_colmap.io.colmap.depth_map import read_depth_map, write_depth_map
+from resdepth_colmap.io.colmap.maps import read_depth_map, write_depth_map
 from resdepth_colmap.io.colmap.model import read_scene
 from resdepth_colmap.io.colmap.workspace import Workspace, open_workspace
 from resdepth_colmap.pipeline.stereo.stage import (

@@ -13,7 +13,7 @@ from resdepth_colmap.config import RefineConfig
 from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.evaluation.depth import sample_matching as sample_matching
 from resdepth_colmap.evaluation.depth.match_cache import MatchCache
-from resdepth_colmap.io.colmap.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.maps import read_depth_map
 from resdepth_colmap.io.images import read_rgb
 from scripts.benchmarks.scene_strips import scene_strips, scenes_at
 

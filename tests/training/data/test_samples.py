@@ -14,7 +14,7 @@ from planes import NAMES
 from resdepth_colmap.config import StereoConfig
 from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.geometry.resize import nearest_resized
-from resdepth_colmap.io.colmap.depth_map import read_depth_map, write_depth_map
+from resdepth_colmap.io.colmap.maps import read_depth_map, write_depth_map
 from resdepth_colmap.network.network_config import InputVariant, NetworkConfig
 from resdepth_colmap.pipeline import view_images
 from resdepth_colmap.training.data import labelled_views as labelled_views_module
