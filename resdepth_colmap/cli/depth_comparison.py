@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from resdepth_colmap.cli.command_line import command_line
 from resdepth_colmap.cli.options import Command, build_config, config_options
 from resdepth_colmap.cli.results import (
     UNRECORDED,
+    command_line,
     exit_if_failed,
     result_options,
     show_failure,

@@ -81,7 +81,7 @@ def eth3d(
     """
     options = evaluation_options(values, backend, cache or root / CACHE_NAME)
     from resdepth_colmap.evaluation.datasets.eth3d import Eth3dOptions, eth3d_sources
-    from resdepth_colmap.evaluation.depth.eth3d_tables import eth3d_table
+    from resdepth_colmap.evaluation.depth.tables import eth3d_table
 
     names = ("scenes", "pairs_path", "num_pairs", "image_width_px")
     chosen = Eth3dOptions(**{name: values[name] for name in names})

@@ -77,7 +77,7 @@ def _cloud_rows(cloud: Mapping[str, Any]) -> list[list[str]]:
 
 
 def _show_measures(found: Mapping[str, Any]) -> None:
-    from resdepth_colmap.evaluation.metrics.measures import MEASURES
+    from resdepth_colmap.evaluation.metrics.view_maps import MEASURES
 
     methods = found["measures"]
     measured = [

@@ -22,7 +22,7 @@ from resdepth_colmap.geometry.resize import nearest_resized
 from resdepth_colmap.geometry.view_selection import choose_sources
 from resdepth_colmap.geometry.warp import warp_to_reference
 from resdepth_colmap.io.colmap.maps import read_depth_map
-from resdepth_colmap.io.colmap.sparse_points import read_sparse_points
+from resdepth_colmap.io.colmap.model import read_sparse_points
 from resdepth_colmap.io.colmap.workspace import Workspace
 from resdepth_colmap.pipeline.initial_map import InitialMap
 from resdepth_colmap.pipeline.refine.photometric_error import photometric_error

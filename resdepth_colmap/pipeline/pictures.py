@@ -26,13 +26,7 @@ def draw_workspace(
 ) -> Path:
     """Draw a strip of each refined image, and an overview of them all.
 
-    Strips of images that were kept, and have one, are not drawn again.
-
-    Args:
-        output: Where the refined maps are; pictures go to `pictures/` there.
-        scene: The views.
-        report: Which images were refined, from what.
-        progress: Is told of each image.
+    Strips go to `pictures/`; those of images that were kept are not drawn again.
 
     Returns:
         The overview, `overview.png`.
@@ -70,10 +64,13 @@ def evenly_chosen(names: Sequence[str], most: int) -> list[str]:
 def _load(output: OutputWorkspace, report: RefineReport, name: str) -> BeforeAfter:
     source = output.source
     before = read_depth_map(map_path(source, name, report.images[name]["input"]))
-    after = read_depth_map(output.depth_map_path(name))
-    truth_path = source.truth_path(name)
-    truth = None
-    if truth_path.is_file():
-        truth = nearest_resized(read_depth_map(truth_path), before.shape[::-1])
-    rgb = read_rgb(source.image_path(name))
-    return BeforeAfter(name=name, rgb=rgb, before=before, after=after, truth=truth)
+    path, truth = source.truth_path(name), None
+    if path.is_file():
+        truth = nearest_resized(read_depth_map(path), before.shape[::-1])
+    return BeforeAfter(
+        name=name,
+        rgb=read_rgb(source.image_path(name)),
+        before=before,
+        after=read_depth_map(output.depth_map_path(name)),
+        truth=truth,
+    )

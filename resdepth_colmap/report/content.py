@@ -1,12 +1,11 @@
-"""The content of the page: facts for JSON, and blocks of pictures and clouds."""
+"""The content of the page: facts for JSON, pictures and clouds, and their sizes."""
 
 import base64
 import dataclasses
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, Self
 
 from resdepth_colmap.io.point_cloud import PointCloud
-from resdepth_colmap.report.budget import Budget
 from resdepth_colmap.report.cloud_data import (
     SIZE,
     CloudBox,
@@ -31,7 +30,53 @@ from resdepth_colmap.viz.colormaps import (
     color_table,
 )
 
-CONFIDENCE_COLORS = "viridis"
+MOST_BYTES = 10_000_000
+"""Largest size of the page."""
+
+MOST_IMAGES = 300
+"""Largest number of images; of more, evenly spaced ones are shown."""
+
+_MOST_MAP_PIXELS = 640 * 480.0
+_FEW_IMAGES = 40
+_SAFETY = 0.93
+_LEAST_SHRINKING = 0.9
+_PHOTO_SIDES = (1280, 1.6)  # in pixels; relative to the long side of the map
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Budget:
+    """Sizes of maps and clouds in the page.
+
+    Attributes:
+        map_pixels: Largest number of pixels of a map.
+        depth_step: Relative step of depth values.
+        num_points: Largest number of points of a cloud.
+    """
+
+    map_pixels: float
+    depth_step: float
+    num_points: int
+
+    @classmethod
+    def of(cls, num_images: int) -> Self:
+        """The largest sizes for a number of images; finer values for few images."""
+        is_small = num_images <= _FEW_IMAGES
+        return cls(
+            map_pixels=_MOST_MAP_PIXELS,
+            depth_step=0.0005 if is_small else 0.002,
+            num_points=130_000 if is_small else 70_000,
+        )
+
+    def shrunk(self, num_bytes: float, available: float) -> "Budget":
+        """A budget that shrinks pictures of `num_bytes` to the available bytes."""
+        # A small map needs more bytes per pixel than a large one: hence the margin.
+        factor = min(_LEAST_SHRINKING, _SAFETY * available / max(num_bytes, 1.0))
+        return dataclasses.replace(self, map_pixels=self.map_pixels * max(factor, 1e-3))
+
+    def photo_side_px(self, map_shape: tuple[int, ...]) -> int:
+        """Long side of the photo of a map."""
+        most_px, ratio = _PHOTO_SIDES
+        return int(min(most_px, max(64.0, ratio * max(map_shape[:2]))))
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -55,14 +100,7 @@ class Content:
 def image_content(
     index: int, maps: ImageMaps, facts: Mapping[str, Any], budget: Budget
 ) -> Content:
-    """Photo and maps of one image.
-
-    Args:
-        index: Index of the image among those shown.
-        maps: Its maps, of any size.
-        facts: Its facts.
-        budget: Sizes of the maps.
-    """
+    """Photo and maps of the image with that index among those shown."""
     small = maps.sampled(budget.map_pixels)
     code = DepthCode.of(budget.depth_step, small.before, small.after, small.truth)
     height_px, width_px = small.before.shape
@@ -118,19 +156,13 @@ def color_tables() -> dict[str, Any]:
         "depth": DEPTH_COLORS,
         "difference": DIFFERENCE_COLORS,
         "error": ERROR_COLORS,
-        "confidence": CONFIDENCE_COLORS,
-    }
-    tables = {
-        key: base64.b64encode(color_table(name).tobytes()).decode("ascii")
-        for key, name in names.items()
+        "confidence": "viridis",
     }
     return {
-        "tables": tables,
+        "tables": {
+            key: base64.b64encode(color_table(name).tobytes()).decode("ascii")
+            for key, name in names.items()
+        },
         "errorRange": list(ERROR_RANGE),
         "confidenceLevels": CONFIDENCE_LEVELS,
     }
-
-
-def total_bytes(contents: Iterable[Content]) -> int:
-    """Bytes of all blocks in the page."""
-    return sum(content.num_bytes for content in contents)

@@ -14,13 +14,14 @@ from resdepth_colmap.io.point_cloud import read_cloud
 from resdepth_colmap.pipeline.fuse.to_file import cloud_before_path, cloud_path
 from resdepth_colmap.pipeline.pictures import evenly_chosen
 from resdepth_colmap.progress import Progress, SilentProgress
-from resdepth_colmap.report.budget import MOST_BYTES, MOST_IMAGES, Budget
 from resdepth_colmap.report.content import (
+    MOST_BYTES,
+    MOST_IMAGES,
+    Budget,
     Content,
     cloud_content,
     color_tables,
     image_content,
-    total_bytes,
 )
 from resdepth_colmap.report.facts import (
     image_facts,
@@ -94,7 +95,7 @@ class _Report:
             page = self._page(contents, cloud)
             if len(page) <= MOST_BYTES:
                 return page
-            num_bytes = total_bytes(contents)
+            num_bytes = sum(content.num_bytes for content in contents)
             spare = MOST_BYTES - (len(page) - num_bytes)
             budget = budget.shrunk(num_bytes, spare)
 

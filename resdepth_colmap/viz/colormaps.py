@@ -2,7 +2,7 @@
 
 import dataclasses
 import math
-from typing import Any, NamedTuple, Self
+from typing import NamedTuple, Self
 
 import matplotlib
 import numpy as np
@@ -21,12 +21,7 @@ ERROR_COLORS = "inferno"
 ERROR_RANGE = (0.001, 0.1)
 """Relative errors between which the logarithmic colours of errors run."""
 
-_ROBUST_PERCENT = (2.0, 98.0)
 _LEAST_SPREAD = 0.01  # of the inverse depth: a fronto-parallel wall has none
-_LEAST_DIFFERENCE = 0.001
-
-Ticks = list[tuple[float, str]]
-"""Position on a bar of colours, in 0..1, and text of each tick."""
 
 
 class ColorScale(NamedTuple):
@@ -35,14 +30,14 @@ class ColorScale(NamedTuple):
     Attributes:
         norm: From the values to 0..1.
         colors: Name of the colours.
-        ticks: What is written on the bar.
+        ticks: Position on the bar, in 0..1, and text of each tick.
         label: What the values are, with their unit.
         hole: What a pixel without a value is.
     """
 
     norm: Normalize
     colors: str
-    ticks: Ticks
+    ticks: list[tuple[float, str]]
     label: str
     hole: str
 
@@ -54,9 +49,7 @@ class ColorScale(NamedTuple):
 
     def colored(self, values: FloatMap) -> ColorImage:
         """Values as RGB, shape (H, W, 3), uint8; NaN has the colour of holes."""
-        colors: Any = self.mappable.to_rgba(values, bytes=True)
-        rgb: ColorImage = colors[..., :3]
-        return rgb
+        return np.asarray(self.mappable.to_rgba(values, bytes=True))[..., :3]
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -78,7 +71,7 @@ class DepthScale:
             inverse = invert_map(depth)
             inverse = inverse[inverse > 0]
             if inverse.size:
-                least, most = map(float, np.percentile(inverse, _ROBUST_PERCENT))
+                least, most = map(float, np.percentile(inverse, (2, 98)))
                 missing = max(0.0, _LEAST_SPREAD * most - (most - least))
                 return cls(least=least - missing / 2, most=most + missing / 2)
         return cls(least=0.5, most=1.0)
@@ -86,20 +79,15 @@ class DepthScale:
     @property
     def colors(self) -> ColorScale:
         """The colours of inverse depth, blue far, red near; the bar is in depths."""
-        return ColorScale(
-            Normalize(self.least, self.most),
-            DEPTH_COLORS,
-            self.ticks(),
-            label="depth in workspace units",
-            hole="no depth",
-        )
+        norm, label = Normalize(self.least, self.most), "depth in workspace units"
+        return ColorScale(norm, DEPTH_COLORS, self.ticks(), label, "no depth")
 
     def colored(self, depth: DepthMap) -> ColorImage:
         """A depth map in these colours."""
         inverse = invert_map(depth)
         return self.colors.colored(np.where(inverse > 0, inverse, np.float32(np.nan)))
 
-    def ticks(self, number: int = 5) -> Ticks:
+    def ticks(self, number: int = 5) -> list[tuple[float, str]]:
         """Round depths on the scale: where in 0..1, and how they are written."""
         inverse = np.linspace(self.least, self.most, number + 2)[1:-1]
         depths = [float(1.0 / value) for value in inverse]
@@ -125,7 +113,7 @@ def difference_limit(difference: FloatMap) -> float:
     """A round limit that 95 % of the differences stay below; 1, 2 or 5 times 10^n."""
     size = np.abs(difference[np.isfinite(difference)])
     least = float(np.percentile(size, 95)) if size.size else 0.0
-    least = min(max(least, _LEAST_DIFFERENCE), 1.0)
+    least = min(max(least, 0.001), 1.0)
     power = 10.0 ** math.floor(math.log10(least))
     return next(f * power for f in (1, 2, 5, 10) if f * power >= least * (1 - 1e-6))
 
@@ -140,17 +128,15 @@ def difference_scale(difference: FloatMap) -> ColorScale:
 
 def error_scale() -> ColorScale:
     """The colours of relative errors: logarithmic, bright = large."""
-    return ColorScale(
+    norm, ticks = (
         LogNorm(*ERROR_RANGE, clip=True),
-        ERROR_COLORS,
-        [(0.0, "0.1 %"), (0.5, "1 %"), (1.0, "10 %")],
-        label="error, in percent of the depth",
-        hole="no depth or no truth",
+        [(0, "0.1 %"), (0.5, "1 %"), (1, "10 %")],
     )
+    label, hole = "error, in percent of the depth", "no depth or no truth"
+    return ColorScale(norm, ERROR_COLORS, ticks, label, hole)
 
 
 def color_table(name: str) -> ColorImage:
     """All colours of a scale from first to last, shape (256, 3), uint8."""
-    colors: Any = matplotlib.colormaps[name]
-    table: ColorImage = np.rint(255 * colors(np.arange(256))[:, :3]).astype(np.uint8)
-    return table
+    colors = np.asarray(matplotlib.colormaps[name](np.arange(256)))[:, :3]
+    return np.rint(255 * colors).astype(np.uint8)

@@ -18,7 +18,6 @@ from resdepth_colmap.scene import ColorImage
 from resdepth_colmap.viz.colormaps import HOLE_COLOR, ColorScale
 
 _DPI = 72  # so that a point, matplotlib's unit of fonts, is a pixel
-_MARGIN_PX = 20
 _GAP_PX = 20
 _HEAD_PX = 66
 _CAPTION_PX = 44
@@ -49,7 +48,7 @@ class Panel(NamedTuple):
 def draw_panels(
     title: str, note: str, panels: Sequence[Panel], num_columns: int, least_px: int
 ) -> ColorImage:
-    """Draw panels row by row, under a title and a line of text.
+    """Draw panels row by row, under a title and a note, as one picture.
 
     Args:
         title: Written letter for letter: a file may be called `a$b$`.
@@ -57,17 +56,15 @@ def draw_panels(
         panels: What to draw.
         num_columns: Panels in a row.
         least_px: Width of a panel whose picture is narrower.
-
-    Returns:
-        RGB values, shape (height, width, 3), uint8.
     """
     width_px = max([least_px, *(panel.picture.shape[1] for panel in panels)])
-    starts = range(0, len(panels), num_columns)
-    rows = [panels[start : start + num_columns] for start in starts]
-    grid = _pixel_grid(
-        [_MARGIN_PX, *([width_px, _GAP_PX] * num_columns)[:-1], _MARGIN_PX],
-        [_HEAD_PX, *(height_px for row in rows for height_px in _heights_px(row))],
-    )
+    heights_px = [_HEAD_PX]
+    for start in range(0, len(panels), num_columns):
+        row = panels[start : start + num_columns]
+        bar_px = [_BAR_PX, _BAR_TEXT_PX] if any(it.scale for it in row) else [0, 0]
+        picture_px = max(panel.picture.shape[0] for panel in row)
+        heights_px += [_CAPTION_PX, picture_px, _BAR_GAP_PX, *bar_px]
+    grid = _pixel_grid([_GAP_PX, *([width_px, _GAP_PX] * num_columns)], heights_px)
     with warnings.catch_warnings():
         # Letters that the font does not have become boxes: good enough for a name.
         warnings.filterwarnings("ignore", message="Glyph")
@@ -99,27 +96,14 @@ def resized(rgb: ColorImage, size_px: tuple[int, int]) -> ColorImage:
     return area_resized(rgb, size_px) if is_smaller else nearest_resized(rgb, size_px)
 
 
-def _heights_px(row: Sequence[Panel]) -> list[int]:
-    """Heights of caption, picture, gap, bar and text of the bar in a row."""
-    height_px = max(panel.picture.shape[0] for panel in row)
-    has_bar = any(panel.scale for panel in row)
-    bar_px = [_BAR_PX, _BAR_TEXT_PX] if has_bar else [0, 0]
-    return [_CAPTION_PX, height_px, _BAR_GAP_PX, *bar_px]
-
-
 def _pixel_grid(widths_px: Sequence[int], heights_px: Sequence[int]) -> Any:
     """The grid of a new figure, with columns and rows of exactly these sizes."""
     size = (sum(widths_px) / _DPI, sum(heights_px) / _DPI)
     figure = Figure(figsize=size, dpi=_DPI, facecolor="white")
     FigureCanvasAgg(figure)  # to measure text
-    grid = figure.add_gridspec(
-        nrows=len(heights_px),
-        ncols=len(widths_px),
-        height_ratios=heights_px,
-        width_ratios=widths_px,
-    )
-    grid.update(left=0, right=1, bottom=0, top=1, wspace=0, hspace=0)
-    return grid
+    ratios = {"height_ratios": heights_px, "width_ratios": widths_px}
+    edges = {"left": 0, "right": 1, "bottom": 0, "top": 1, "wspace": 0, "hspace": 0}
+    return figure.add_gridspec(len(heights_px), len(widths_px), **ratios, **edges)
 
 
 def _add_panel(grid: Any, top: int, left: int, panel: Panel) -> None:

@@ -25,10 +25,13 @@ _LEAST_BLOCK_PX = 470
 _GAP_PX = 10
 _BAD_ERROR = 0.02
 
+Size = tuple[int, int]
+"""Width and height, in pixels."""
+
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class BeforeAfter:
-    """What a strip shows.
+    """What a strip shows; ValueError if the maps differ in size.
 
     Attributes:
         name: Image name.
@@ -36,9 +39,6 @@ class BeforeAfter:
         before: Initial depth, shape (H, W), in workspace units; 0 = no depth.
         after: Refined depth, same shape.
         truth: True depth, same shape, 0 = not known; None = nothing is known.
-
-    Raises:
-        ValueError: If the maps differ in size.
     """
 
     name: str
@@ -67,21 +67,13 @@ class BeforeAfter:
     def pictures(self, long_side_px: int) -> list[ColorImage]:
         """Photo, initial and refined depth in one size."""
         size_px = fitted_size(self.before.shape, long_side_px)
-        maps = [
-            _shown(depth, self.scale.colored, size_px)
-            for depth in (self.before, self.after)
-        ]
-        return [resized(self.rgb, size_px), *maps]
+        maps = (self.before, self.after)
+        shown = [_shown(depth, self.scale.colored, size_px) for depth in maps]
+        return [resized(self.rgb, size_px), *shown]
 
 
 def depth_strip(content: BeforeAfter) -> ColorImage:
-    """Draw the strip: photo, initial depth, refined depth, difference.
-
-    With the truth, the relative error of both maps follows, in a second row.
-
-    Returns:
-        RGB values, shape (height, width, 3), uint8.
-    """
+    """Draw photo, both depth maps, difference and, with the truth, both errors."""
     before, after, difference = content.before, content.after, content.difference
     size_px = fitted_size(before.shape, _PANEL_PX)
     photo, initial, refined = content.pictures(_PANEL_PX)
@@ -132,9 +124,6 @@ def overview(title: str, images: Sequence[Panel], num_images: int) -> ColorImage
         title: What the workspace is called.
         images: The `thumbnails` of those to show.
         num_images: How many there are in all.
-
-    Returns:
-        RGB values, shape (height, width, 3), uint8.
     """
     panels = [*(panel._replace(scale=None) for panel in images[:-1]), *images[-1:]]
     shown = "photo | initial depth | refined depth"
@@ -152,9 +141,7 @@ def _error_panel(depth: DepthMap, truth: DepthMap, title: str) -> Panel:
 
 
 def _shown(
-    values: FloatMap,
-    colored: Callable[[FloatMap], ColorImage],
-    size_px: tuple[int, int],
+    values: FloatMap, colored: Callable[[FloatMap], ColorImage], size_px: Size
 ) -> ColorImage:
     """A map in its colours. They are averaged, values are not: 0 or NaN is a hole."""
     enough_px = (2 * size_px[0], 2 * size_px[1])

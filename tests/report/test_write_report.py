@@ -14,7 +14,7 @@ from report_workspaces import NUM_HOLE_ROWS, refined_workspace
 
 from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.io.colmap.maps import write_depth_map
-from resdepth_colmap.report.budget import MOST_BYTES
+from resdepth_colmap.report.content import MOST_BYTES
 from resdepth_colmap.report.write_report import write_report
 
 

@@ -13,9 +13,11 @@ import numpy as np
 import numpy.typing as npt
 
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.evaluation.cloud.completeness import completeness_levels
+from resdepth_colmap.evaluation.cloud.point_shares import (
+    VoxelGrids,
+    completeness_levels,
+)
 from resdepth_colmap.evaluation.cloud.scores import CloudScores
-from resdepth_colmap.evaluation.cloud.voxel_mean import VoxelGrids
 from resdepth_colmap.evaluation.datasets.workspaces import TRUTH_FOLDER
 from resdepth_colmap.geometry.pixels import index_K
 from resdepth_colmap.geometry.projection import back_project, look_up, transform

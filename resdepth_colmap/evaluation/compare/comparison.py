@@ -22,8 +22,7 @@ from resdepth_colmap.evaluation.compare.method_clouds import (
     fuse_methods,
     fusion_settings,
 )
-from resdepth_colmap.evaluation.compare.method_maps import MethodMaps
-from resdepth_colmap.evaluation.compare.methods import find_methods
+from resdepth_colmap.evaluation.compare.methods import MethodMaps, find_methods
 from resdepth_colmap.evaluation.compare.result import Comparison, GroundTruth
 from resdepth_colmap.evaluation.compare.view_metrics import (
     MeasuredView,
@@ -31,10 +30,9 @@ from resdepth_colmap.evaluation.compare.view_metrics import (
     measure_views,
 )
 from resdepth_colmap.evaluation.datasets.scenes import distinct_names
-from resdepth_colmap.evaluation.metrics.measures import MEASURES
-from resdepth_colmap.io.colmap.model import read_scene
+from resdepth_colmap.evaluation.metrics.view_maps import MEASURES
+from resdepth_colmap.io.colmap.model import read_scene, read_sparse_points
 from resdepth_colmap.io.colmap.output import OutputWorkspace
-from resdepth_colmap.io.colmap.sparse_points import read_sparse_points
 from resdepth_colmap.io.colmap.workspace import check_images, open_workspace
 from resdepth_colmap.pipeline.view_images import ViewImages
 from resdepth_colmap.progress import Progress, SilentProgress

@@ -10,8 +10,7 @@ from typing import Any
 
 from resdepth_colmap.config import FuseConfig, Fuser
 from resdepth_colmap.errors import FusionError
-from resdepth_colmap.evaluation.compare.method_maps import confident_depth
-from resdepth_colmap.evaluation.compare.methods import Method
+from resdepth_colmap.evaluation.compare.methods import Method, confident_depth
 from resdepth_colmap.io.colmap.output import OutputWorkspace
 from resdepth_colmap.io.colmap.workspace import Workspace
 from resdepth_colmap.io.files import link_or_copy

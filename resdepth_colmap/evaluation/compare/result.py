@@ -11,9 +11,8 @@ from resdepth_colmap.evaluation.cloud.scores import CloudScores
 from resdepth_colmap.evaluation.compare.method_clouds import MethodCloud
 from resdepth_colmap.evaluation.compare.methods import REFINED, FoundMethods
 from resdepth_colmap.evaluation.compare.view_metrics import MeasuredView
-from resdepth_colmap.evaluation.metrics.measures import MEASURES
 from resdepth_colmap.evaluation.metrics.paired_difference import paired_difference
-from resdepth_colmap.evaluation.metrics.tile_sums import TileSums
+from resdepth_colmap.evaluation.metrics.view_maps import MEASURES, TileSums
 from resdepth_colmap.evaluation.plain import finite_mean, plain
 from resdepth_colmap.progress import Progress
 

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from resdepth_colmap.evaluation.cloud.reference_cloud import ReferenceCloud
-from resdepth_colmap.evaluation.compare.method_maps import MethodMaps
-from resdepth_colmap.evaluation.compare.methods import REFINED
+from resdepth_colmap.evaluation.compare.methods import REFINED, MethodMaps
 from resdepth_colmap.evaluation.metrics.reference_free import (
     Sums,
     against_truth,
@@ -20,7 +19,7 @@ from resdepth_colmap.evaluation.metrics.rewarped_photos import photo_correlation
 from resdepth_colmap.evaluation.metrics.view_maps import ViewMaps
 from resdepth_colmap.geometry.resize import nearest_resized
 from resdepth_colmap.geometry.view_selection import choose_sources
-from resdepth_colmap.io.colmap.sparse_points import SparsePoints
+from resdepth_colmap.io.colmap.model import SparsePoints
 from resdepth_colmap.pipeline.refine.load_view import view_inputs
 from resdepth_colmap.pipeline.view_images import ViewImages
 from resdepth_colmap.progress import Progress

@@ -30,13 +30,14 @@ from resdepth_colmap.geometry.depth_range import depth_range
 from resdepth_colmap.geometry.pixels import index_K
 from resdepth_colmap.geometry.resize import area_resized
 from resdepth_colmap.io.colmap.model import read_scene
-from resdepth_colmap.io.distorted_camera import DistortedView, read_distorted_views
 from resdepth_colmap.io.eth3d import (
     DISTORTED,
     DOWNLOADS,
     UNDISTORTED,
+    DistortedView,
     Eth3dScene,
     find_eth3d_scenes,
+    read_distorted_views,
 )
 from resdepth_colmap.io.images import read_gray, read_unit_colors
 from resdepth_colmap.matching.patch_match import MatchView

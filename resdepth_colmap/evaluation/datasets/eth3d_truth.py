@@ -14,8 +14,12 @@ from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.geometry.pixels import CENTER_PX, index_K
 from resdepth_colmap.geometry.projection import transform
 from resdepth_colmap.geometry.splat import splat_depth
-from resdepth_colmap.io.distorted_camera import DistortedView
-from resdepth_colmap.io.eth3d import Eth3dScene, read_evaluated, read_raw_depth
+from resdepth_colmap.io.eth3d import (
+    DistortedView,
+    Eth3dScene,
+    read_evaluated,
+    read_raw_depth,
+)
 from resdepth_colmap.scene import Camera, DepthMap, Matrix, View, cam_from_cam
 
 _PIXELS_AT_ONCE = 1 << 21

@@ -18,9 +18,9 @@ from resdepth_colmap.evaluation.datasets.sample import (
     LazySample,
     SampleOptions,
 )
+from resdepth_colmap.io.exported_map import read_pfm
 from resdepth_colmap.io.files import read_text
 from resdepth_colmap.io.images import read_gray, read_unit_colors
-from resdepth_colmap.io.pfm import read_pfm
 from resdepth_colmap.matching.patch_match import MatchView
 from resdepth_colmap.scene import DepthMap, FloatMap, Matrix
 

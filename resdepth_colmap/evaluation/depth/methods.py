@@ -13,8 +13,10 @@ import numpy.typing as npt
 from resdepth_colmap.config import RefineConfig
 from resdepth_colmap.evaluation.datasets.sample import DepthSample, InitialDepth
 from resdepth_colmap.evaluation.depth.sample_refinement import refine_sample
-from resdepth_colmap.evaluation.metrics.depth_metrics import median_filtered
-from resdepth_colmap.evaluation.metrics.depth_regions import edge_region
+from resdepth_colmap.evaluation.metrics.depth_metrics import (
+    edge_region,
+    median_filtered,
+)
 from resdepth_colmap.evaluation.metrics.pooled_metrics import PooledErrors
 from resdepth_colmap.network.unet import ResDepthNet
 

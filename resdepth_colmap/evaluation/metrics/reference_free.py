@@ -11,10 +11,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from resdepth_colmap.evaluation.metrics.tile_sums import TileSums, with_common
-from resdepth_colmap.evaluation.metrics.view_maps import ViewMaps
+from resdepth_colmap.evaluation.metrics.view_maps import TileSums, ViewMaps, with_common
 from resdepth_colmap.geometry.projection import lift, look_up, transform
-from resdepth_colmap.io.colmap.sparse_points import SparsePoints
+from resdepth_colmap.io.colmap.model import SparsePoints
 from resdepth_colmap.scene import DepthMap, cam_from_cam
 
 Flags = npt.NDArray[np.bool_]

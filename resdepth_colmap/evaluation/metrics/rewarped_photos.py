@@ -4,8 +4,7 @@ import torch
 from torch import Tensor
 
 from resdepth_colmap.evaluation.metrics.reference_free import Sums
-from resdepth_colmap.evaluation.metrics.tile_sums import with_common
-from resdepth_colmap.evaluation.metrics.view_maps import ViewMaps
+from resdepth_colmap.evaluation.metrics.view_maps import ViewMaps, with_common
 from resdepth_colmap.geometry.inverse_depth import invert_map
 from resdepth_colmap.geometry.warp import warp_to_reference
 from resdepth_colmap.pipeline.refine.photometric_error import photometric_error

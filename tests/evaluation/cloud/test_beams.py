@@ -6,13 +6,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from resdepth_colmap.evaluation.cloud.beams import judge
 from resdepth_colmap.evaluation.cloud.config import CloudConfig
 from resdepth_colmap.evaluation.cloud.laser_scan import (
     NUM_COLUMNS,
     NUM_ROWS,
     Floats,
     columns_of,
+    judge,
     rows_of,
     sort_scan,
     spherical,

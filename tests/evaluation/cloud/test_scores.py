@@ -12,7 +12,7 @@ from laser_scans import ROOM_M, Points, in_world, pose, room_scan
 from scipy.spatial.transform import Rotation
 
 from resdepth_colmap.errors import ConfigError
-from resdepth_colmap.evaluation.cloud import beams, completeness
+from resdepth_colmap.evaluation.cloud import laser_scan, point_shares
 from resdepth_colmap.evaluation.cloud.config import CloudConfig
 from resdepth_colmap.evaluation.cloud.laser_truth import score_cloud_file
 from resdepth_colmap.evaluation.cloud.scores import (
@@ -180,9 +180,9 @@ def test_the_size_of_the_pieces_changes_nothing(
     scans = room_scan(num_rows=24), room_scan((3, 2, 1.5), (0, 10, 0), num_rows=24)
     cloud = np.concatenate([noisy(scan) for scan in scans])
     before = score(cloud, *scans)
-    monkeypatch.setattr(beams, "_SPANS_AT_ONCE", 7)
-    monkeypatch.setattr(beams, "_PAIRS_AT_ONCE", 5)
-    monkeypatch.setattr(completeness, "_POINTS_AT_ONCE", 11)
+    monkeypatch.setattr(laser_scan, "_SPANS_AT_ONCE", 7)
+    monkeypatch.setattr(laser_scan, "_PAIRS_AT_ONCE", 5)
+    monkeypatch.setattr(point_shares, "_POINTS_AT_ONCE", 11)
     monkeypatch.setattr("resdepth_colmap.evaluation.cloud.scores._POINTS_AT_ONCE", 300)
     assert score(cloud, *scans) == before
 

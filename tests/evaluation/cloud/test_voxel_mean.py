@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from resdepth_colmap.evaluation.cloud.voxel_mean import VoxelGrids
+from resdepth_colmap.evaluation.cloud.point_shares import VoxelGrids
 
 
 def grids(points: list[list[float]]) -> VoxelGrids:

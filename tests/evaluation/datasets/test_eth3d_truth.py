@@ -22,8 +22,7 @@ from resdepth_colmap.evaluation.datasets.sample import SampleOptions
 from resdepth_colmap.geometry.pixels import index_K
 from resdepth_colmap.geometry.projection import project
 from resdepth_colmap.io.colmap.model import read_scene
-from resdepth_colmap.io.distorted_camera import read_distorted_views
-from resdepth_colmap.io.eth3d import Eth3dScene
+from resdepth_colmap.io.eth3d import Eth3dScene, read_distorted_views
 from resdepth_colmap.io.ply_points import read_ply_points
 from resdepth_colmap.io.scan_alignment import read_scan_alignment
 from resdepth_colmap.scene import Camera, DepthMap, View

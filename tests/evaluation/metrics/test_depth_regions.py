@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from resdepth_colmap.evaluation.metrics.depth_regions import EDGE_RADIUS_PX, edge_region
+from resdepth_colmap.evaluation.metrics.depth_metrics import EDGE_RADIUS_PX, edge_region
 
 
 def test_an_edge_is_as_wide_as_its_radius_on_both_sides() -> None:

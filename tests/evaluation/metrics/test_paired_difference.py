@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from resdepth_colmap.evaluation.metrics.paired_difference import paired_difference
-from resdepth_colmap.evaluation.metrics.tile_sums import TileSums
+from resdepth_colmap.evaluation.metrics.view_maps import TileSums
 
 VALUES = arrays(np.float64, 7, elements=st.floats(-1, 1))
 Array = npt.NDArray[np.float64]

@@ -7,7 +7,7 @@ import pytest
 from planes import points_on_plane, write_plane_workspace
 
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.io.colmap.sparse_points import read_sparse_points
+from resdepth_colmap.io.colmap.model import read_sparse_points
 
 
 @pytest.mark.parametrize("binary", [True, False])
