@@ -19,7 +19,7 @@ from resdepth_colmap.config import FuseConfig
 from resdepth_colmap.evaluation.compare.config import FUSE_OPTIONS, CompareConfig
 
 if TYPE_CHECKING:
-    from resdepth_colmap.evaluation.compare.result import GroundTruth
+    from resdepth_colmap.evaluation.compare.comparison import GroundTruth
 
 
 @command(

@@ -138,5 +138,5 @@ def error_scale() -> ColorScale:
 
 def color_table(name: str) -> ColorImage:
     """All colours of a scale from first to last, shape (256, 3), uint8."""
-    colors = np.asarray(matplotlib.colormaps[name](np.arange(256)))[:, :3]
-    return np.rint(255 * colors).astype(np.uint8)
+    colors = np.asarray(matplotlib.colormaps[name](np.arange(256)), np.float64)
+    return np.rint(255 * colors[:, :3]).astype(np.uint8)

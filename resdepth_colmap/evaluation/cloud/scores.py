@@ -29,6 +29,11 @@ _FAR_M = 1e15  # its square is finite in float32
 
 Points = npt.NDArray[np.float32]
 
+_MAX_DISTANCE = 0.05  # median distance from the scans, relative to their extent
+_MAX_RATIO = 10.0  # of the extents of cloud and scans, either way
+_NUM_SAMPLES = 20_000
+_NUM_QUERIES = 1_000
+
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class PlacedScan:
@@ -97,7 +102,7 @@ def cloud_scores(
     world = np.concatenate([_moved(p, T) for p, T in zip(local, poses, strict=True)])
     if len(world) == 0:
         raise ValueError("the scans have no point.")
-    warn_of_misfit(points, world)
+    _warn_of_misfit(points, world)
     completeness = _completeness(points, world, config, progress)
     num_scan_points = len(world)
     del world
@@ -181,28 +186,8 @@ def _finite(points: Points, name: str) -> Points:
     return points[is_finite]
 
 
-logger = logging.getLogger(__name__)
-
-MAX_DISTANCE = 0.05
-"""Largest median distance from the scans, relative to their extent."""
-
-MAX_RATIO = 10.0
-"""Largest ratio of the extents of cloud and scans, either way."""
-
-_NUM_SAMPLES = 20_000
-_NUM_QUERIES = 1_000
-
-Points = npt.NDArray[np.float32]
-
-
-def warn_of_misfit(points: Points, scan_points: Points) -> None:
-    """Log a warning if a cloud is in other units than the scans, or elsewhere.
-
-    Args:
-        points: Coordinates of the cloud, shape (N, 3), finite.
-        scan_points: Coordinates of the scans' points in the world, shape (M, 3), at
-            least one, finite.
-    """
+def _warn_of_misfit(points: Points, scan_points: Points) -> None:
+    """Log a warning if a cloud is in other units than the scans, or elsewhere."""
     if len(points) == 0:
         logger.warning("the cloud has no point; all scores are 0.")
         return
@@ -211,8 +196,8 @@ def warn_of_misfit(points: Points, scan_points: Points) -> None:
     distances, _ = cKDTree(samples).query(queries, eps=0.1)
     median_m = float(np.median(distances))
     cloud_m, scans_m = _extent(queries), _extent(samples)
-    is_near = median_m <= MAX_DISTANCE * scans_m
-    is_alike = scans_m <= MAX_RATIO * cloud_m and cloud_m <= MAX_RATIO * scans_m
+    is_near = median_m <= _MAX_DISTANCE * scans_m
+    is_alike = scans_m <= _MAX_RATIO * cloud_m and cloud_m <= _MAX_RATIO * scans_m
     if not (is_near and is_alike):
         logger.warning(
             "half of the cloud is more than %.2g m from the scans; it extends over "

@@ -6,9 +6,10 @@ import logging
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
+import numpy.typing as npt
 
 from resdepth_colmap.errors import ResDepthError
 from resdepth_colmap.evaluation.cloud.reference_cloud import (
@@ -22,15 +23,20 @@ from resdepth_colmap.evaluation.compare.method_clouds import (
     fuse_methods,
     fusion_settings,
 )
-from resdepth_colmap.evaluation.compare.methods import MethodMaps, find_methods
-from resdepth_colmap.evaluation.compare.result import Comparison, GroundTruth
+from resdepth_colmap.evaluation.compare.methods import (
+    REFINED,
+    MethodMaps,
+    find_methods,
+)
 from resdepth_colmap.evaluation.compare.view_metrics import (
     MeasuredView,
     MetricInputs,
     measure_views,
 )
 from resdepth_colmap.evaluation.datasets.scenes import distinct_names
-from resdepth_colmap.evaluation.metrics.view_maps import MEASURES
+from resdepth_colmap.evaluation.metrics.paired_difference import paired_difference
+from resdepth_colmap.evaluation.metrics.view_maps import MEASURES, TileSums
+from resdepth_colmap.evaluation.plain import finite_mean, plain
 from resdepth_colmap.io.colmap.model import read_scene, read_sparse_points
 from resdepth_colmap.io.colmap.output import OutputWorkspace
 from resdepth_colmap.io.colmap.workspace import check_images, open_workspace
@@ -52,6 +58,16 @@ NO_POINTS = "no sparse points with tracks, so none are compared with the maps."
 logger = logging.getLogger(__name__)
 
 
+class GroundTruth(Protocol):
+    """What clouds are scored against."""
+
+    def score(self, points: npt.NDArray[np.float32], progress: Progress) -> CloudScores:
+        """Score the points of a cloud, shape (N, 3)."""
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Kind and size of the ground truth, ready for JSON."""
+
+
 def compare_workspaces(
     paths: Sequence[Path],
     config: CompareConfig,
@@ -64,7 +80,7 @@ def compare_workspaces(
     """Compare the methods of each workspace; a broken workspace stops no other.
 
     Args:
-        paths: The workspaces.
+        paths: The workspaces; they stay as they are.
         config: Which maps, and how they are fused and scored.
         truth: What to score all clouds against; None = each one's `ground_truth/`.
         in_place: Whether the maps were refined in place.
@@ -77,15 +93,13 @@ def compare_workspaces(
     results, failed = {}, {}
     for name, path in zip(distinct_names(paths), paths, strict=True):
         try:
-            comparison = compare_workspace(
-                path, config, truth, in_place=in_place, progress=progress
+            results[name] = _compared(
+                path, config, truth, in_place, progress or SilentProgress()
             )
         except ResDepthError as error:
             failed[name] = " ".join(str(error).split())
             if on_failure:
                 on_failure(name, failed[name])
-        else:
-            results[name] = comparison.to_mapping()
     return {
         "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
         "versions": versions(),
@@ -96,27 +110,15 @@ def compare_workspaces(
     }
 
 
-def compare_workspace(
+def _compared(
     path: Path,
     config: CompareConfig,
-    truth: GroundTruth | None = None,
-    *,
-    in_place: bool = False,
-    progress: Progress | None = None,
-) -> Comparison:
-    """Compare the methods of a workspace, which stays as it is.
-
-    Args:
-        path: The workspace, or a parent of it, with refined maps and initial ones.
-        config: Which maps, and how they are fused and scored.
-        truth: What to score the clouds against; None = `ground_truth/`, if present.
-        in_place: Whether the maps were refined in place.
-        progress: Reports the progress.
-
-    Raises:
-        WorkspaceError: If the workspace is broken, or has no refined or no initial map.
-    """
-    start, progress = time.perf_counter(), progress or SilentProgress()
+    truth: GroundTruth | None,
+    in_place: bool,
+    progress: Progress,
+) -> dict[str, Any]:
+    """The comparison of the methods of a workspace, ready for JSON."""
+    start = time.perf_counter()
     workspace = open_workspace(path)
     scene = read_scene(workspace.sparse_path, workspace.images_path, workspace.path)
     output = OutputWorkspace(source=workspace, in_place=in_place)
@@ -133,32 +135,72 @@ def compare_workspace(
     views = measure_views(maps, inputs, progress)
     clouds = fuse_methods(workspace, scene, found.methods, config.fuse, progress)
     truth = truth or reference
-    return Comparison(
-        found=found,
-        clouds=clouds,
-        scores=_scored(clouds, truth, progress),
-        settings=dict(fusion_settings(config.fuse, len(found.views))),
-        truth=truth,
-        views=tuple(views),
-        notes=(*found.notes, *_notes(scene, truth, reference, views)),
-        seconds=time.perf_counter() - start,
-    )
+    return {
+        "views": [view.name for view in found.views],
+        "methods": {method.name: method.to_mapping() for method in found.methods},
+        "notes": [*found.notes, *_notes(scene, truth, reference, views)],
+        "fusion": fusion_settings(config.fuse, len(found.views)),
+        "truth": None if truth is None else truth.to_mapping(),
+        "clouds": {
+            fuser: {name: _scored(it, truth, progress) for name, it in methods.items()}
+            for fuser, methods in clouds.items()
+        },
+        **_measures(views, [method.name for method in found.methods]),
+        "seconds": round(time.perf_counter() - start, 2),
+    }
 
 
 def _scored(
-    clouds: dict[str, dict[str, MethodCloud]],
-    truth: GroundTruth | None,
-    progress: Progress,
-) -> dict[str, dict[str, CloudScores]]:
-    if truth is None:
-        return {}
-    return {
-        fuser: {
-            method: truth.score(it.cloud.points, progress)
-            for method, it in methods.items()
-            if it.cloud is not None
+    cloud: MethodCloud, truth: GroundTruth | None, progress: Progress
+) -> dict[str, Any]:
+    scores = None
+    if truth is not None and cloud.cloud is not None:
+        scores = truth.score(cloud.cloud.points, progress).to_mapping()
+    return {**cloud.to_mapping(), "scores": scores}
+
+
+def _measures(
+    views: Sequence[MeasuredView], methods: Sequence[str]
+) -> dict[str, dict[str, Any]]:
+    """Means over the views, differences of the refined maps from others, each view."""
+
+    def sums(method: str, measure: str) -> list[TileSums]:
+        """Of the views that have the measure; the same views for every method."""
+        found = (view.sums[method] for view in views)
+        return [it[measure] for it in found if measure in it]
+
+    def means(method: str, measure: str) -> list[float]:
+        return [it.mean for it in sums(method, measure)]
+
+    def tile_means(method: str, measure: str) -> list[float]:
+        return [mean for it in sums(method, measure) for mean in it.means]
+
+    def paired(method: str, measure: str) -> dict[str, Any]:
+        """Differences of the views, and of their tiles."""
+        by_view = [means(name, measure) for name in (REFINED, method)]
+        by_tile = [tile_means(name, measure) for name in (REFINED, method)]
+        return {
+            "views": paired_difference(*by_view).to_mapping(),
+            "tiles": paired_difference(*by_tile, resample=False).to_mapping(),
         }
-        for fuser, methods in clouds.items()
+
+    return {
+        "measures": {
+            name: {it: plain(finite_mean(means(name, it))) for it in MEASURES}
+            for name in methods
+        },
+        "paired": {
+            f"{REFINED} - {name}": {it: paired(name, it) for it in MEASURES}
+            for name in methods
+            if name != REFINED
+        },
+        "per_view": {
+            view.name: {
+                method: {name: plain(it.mean) for name, it in by_measure.items()}
+                for method, by_measure in view.sums.items()
+            }
+            for view in views
+        },
     }
 
 
@@ -179,13 +221,12 @@ def _notes(
     if scene.num_shared_points is None:
         notes.append(NO_POINTS)
     ratios = [view.depth_ratio for view in views if view.depth_ratio is not None]
-    if ratios:
-        ratio = float(np.median(ratios))
-        if not LIKELY_RATIOS[0] <= ratio <= LIKELY_RATIOS[1]:
-            notes.append(
-                f"the refined depth is {ratio:.3g} times the true depth (median): the "
-                "ground truth is in other units or of another scene; scale it to the "
-                "units of the model."
-            )
-            logger.warning(notes[-1])
+    ratio = float(np.median(ratios)) if ratios else 1.0
+    if not LIKELY_RATIOS[0] <= ratio <= LIKELY_RATIOS[1]:
+        notes.append(
+            f"the refined depth is {ratio:.3g} times the true depth (median): the "
+            "ground truth is in other units or of another scene; scale it to the "
+            "units of the model."
+        )
+        logger.warning(notes[-1])
     return notes

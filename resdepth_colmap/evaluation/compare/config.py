@@ -53,9 +53,4 @@ class CompareConfig(Config):
     def to_mapping(self) -> dict[str, Any]:
         """Plain values, ready for JSON."""
         fuse = {name: getattr(self.fuse, name) for name in FUSE_OPTIONS}
-        return {
-            "unfiltered": self.unfiltered,
-            "filtered": self.filtered,
-            "tolerances": list(self.tolerances),
-            "fuse": fuse,
-        }
+        return {**vars(self), "tolerances": list(self.tolerances), "fuse": fuse}

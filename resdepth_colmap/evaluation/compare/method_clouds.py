@@ -4,7 +4,7 @@ import dataclasses
 import functools
 import tempfile
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -50,14 +50,11 @@ class MethodCloud:
 
     def to_mapping(self) -> dict[str, Any]:
         """Plain values, ready for JSON."""
-        statistics = self.statistics
         return {
             "num_points": None if self.cloud is None else len(self.cloud),
             "seconds": round(self.seconds, 2),
             "note": self.note,
-            "statistics": None
-            if statistics is None
-            else dataclasses.asdict(statistics),
+            "statistics": self.statistics and dataclasses.asdict(self.statistics),
         }
 
 
@@ -68,16 +65,10 @@ def fuse_methods(
     config: FuseConfig,
     progress: Progress,
 ) -> dict[str, dict[str, MethodCloud]]:
-    """Fuse the maps of every method twice; the workspace stays as it is.
+    """Fuse the maps of every method with the thresholds of both fusers.
 
-    Normals of views without a normal map are computed from the depth.
-
-    Args:
-        workspace: Has images and model.
-        scene: Its views.
-        methods: What to fuse.
-        config: Thresholds of both.
-        progress: Reports the progress.
+    The workspace stays as it is. Normals of views without a normal map are computed
+    from the depth.
 
     Returns:
         The clouds by fuser, then by method.
@@ -98,27 +89,22 @@ def fuse_methods(
     return clouds
 
 
-def fusion_settings(config: FuseConfig, num_views: int) -> Mapping[str, dict[str, Any]]:
+def fusion_settings(config: FuseConfig, num_views: int) -> dict[str, dict[str, Any]]:
     """The options of each fuser, under its own names; the same for all methods."""
     needed = min(config.min_num_views, num_views)
-    shared = {
-        "max_depth_error": config.max_depth_error,
-        "max_reproj_error": config.max_reproj_error,
-    }
-    angle, confidence = config.max_normal_error_deg, config.min_confidence
+
+    def settings(num_name: str, angle_name: str) -> dict[str, Any]:
+        return {
+            num_name: needed,
+            "max_depth_error": config.max_depth_error,
+            "max_reproj_error": config.max_reproj_error,
+            angle_name: config.max_normal_error_deg,
+            "min_confidence": config.min_confidence,
+        }
+
     return {
-        str(Fuser.OPEN3D): {
-            "min_num_views": needed,
-            **shared,
-            "max_normal_error_deg": angle,
-            "min_confidence": confidence,
-        },
-        str(Fuser.COLMAP): {
-            "min_num_pixels": needed,
-            **shared,
-            "max_normal_error": angle,
-            "min_confidence": confidence,
-        },
+        str(Fuser.OPEN3D): settings("min_num_views", "max_normal_error_deg"),
+        str(Fuser.COLMAP): settings("min_num_pixels", "max_normal_error"),
     }
 
 

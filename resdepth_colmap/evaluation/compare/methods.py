@@ -85,11 +85,6 @@ def find_methods(
 ) -> FoundMethods:
     """Find the methods of a workspace by the share of pixels that its maps fill.
 
-    Args:
-        output: Where the refined maps of the workspace are.
-        scene: Its views.
-        config: May name the kinds of map.
-
     Raises:
         WorkspaceError: If there are no refined maps, no initial ones, no view that has
             both, or a map is broken.
@@ -205,11 +200,7 @@ class MethodMaps(Sequence[ViewMaps]):
         return len(self._methods[0].files)
 
     def __getitem__(self, index: int) -> ViewMaps:  # type: ignore[override] # no slices
-        """The maps of a view, resized to the largest of them.
-
-        Raises:
-            WorkspaceError: If a map cannot be read.
-        """
+        """The maps of a view at the largest size; WorkspaceError if one is broken."""
         files = {method.name: method.files[index] for method in self._methods}
         depths = {name: self._depth(name, file) for name, file in files.items()}
         height_px, width_px = max(depth.shape for depth in depths.values())
@@ -222,21 +213,14 @@ class MethodMaps(Sequence[ViewMaps]):
         )
 
     def _depth(self, method: str, file: MapFiles) -> DepthMap:
-        return self._cache.get(
-            (method, file.view.name),
-            lambda: confident_depth(file, self._min_confidence),
-        )
+        key = (method, file.view.name)
+        return self._cache.get(key, lambda: confident_depth(file, self._min_confidence))
 
 
 def confident_depth(file: MapFiles, min_confidence: float) -> DepthMap:
-    """The depth map of a view without depth of low confidence.
+    """The depth map of a view, shape (H, W); 0 where the confidence is lower.
 
-    Args:
-        file: The maps; without a confidence map, all depth is kept.
-        min_confidence: Depth of a lower confidence becomes 0.
-
-    Raises:
-        WorkspaceError: If a map cannot be read.
+    Without a confidence map, all depth is kept. WorkspaceError if a map is broken.
     """
     depth = read_depth_map(file.depth_path)
     path = file.confidence_path

@@ -74,16 +74,7 @@ class MetricInputs:
 def measure_views(
     maps: MethodMaps, inputs: MetricInputs, progress: Progress
 ) -> list[MeasuredView]:
-    """Measure each view.
-
-    Args:
-        maps: The compared views; at least one.
-        inputs: What they are compared with.
-        progress: Reports the progress.
-
-    Raises:
-        WorkspaceError: If a map or image cannot be read.
-    """
+    """Measure each view; WorkspaceError if a map or image cannot be read."""
     scene = inputs.scene
     compared = [scene.index(maps[index].view.name) for index in range(len(maps))]
     measured = []

@@ -27,10 +27,7 @@ def match_by_colmap(
 ) -> DepthMap:
     """Match the first view against the others, in a temporary workspace.
 
-    Args:
-        views: The reference and its sources.
-        depth_range: Nearest and farthest depth, in units.
-        config: Window and weights; the other options keep COLMAP's defaults.
+    Of `config` window and weights count; other options keep COLMAP's defaults.
 
     Returns:
         The photometric depth map without COLMAP's filter, shape (H, W), in units; 0 =
@@ -60,11 +57,7 @@ def match_by_colmap(
 
 
 def write_pair_workspace(path: Path, views: Sequence[MatchView]) -> None:
-    """Write a dense workspace in which COLMAP matches the first view.
-
-    Args:
-        path: An empty folder.
-        views: The reference and its sources; images are stored with 8 bits.
+    """Write a dense workspace, images of 8 bits, in which COLMAP matches the first view.
 
     Raises:
         WorkspaceError: If a file cannot be written.

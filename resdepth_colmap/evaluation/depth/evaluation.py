@@ -4,6 +4,7 @@ import dataclasses
 import datetime
 import logging
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -11,12 +12,11 @@ from resdepth_colmap.config import RefineConfig, StereoBackend, StereoConfig
 from resdepth_colmap.errors import ResDepthError, WorkspaceError
 from resdepth_colmap.evaluation.datasets.paper import PAPER_MAX_RESIDUAL
 from resdepth_colmap.evaluation.datasets.sample import (
-    DepthSample,
     SampleOptions,
     SceneSource,
 )
 from resdepth_colmap.evaluation.depth.match_cache import MatchCache
-from resdepth_colmap.evaluation.depth.methods import SampleResult, measure_sample
+from resdepth_colmap.evaluation.depth.methods import measure_sample
 from resdepth_colmap.evaluation.depth.result import DepthReport, SceneResult
 from resdepth_colmap.evaluation.depth.sample_matching import (
     initial_depth,
@@ -31,6 +31,10 @@ from resdepth_colmap.progress import Progress, SilentProgress
 from resdepth_colmap.versions import hardware, versions
 
 _WARM_UP_PX = 32
+_REFINE_OPTIONS = (
+    *("inner_iterations", "outer_iterations", "update_gating"),
+    *("tile_px", "overlap_px"),
+)
 
 logger = logging.getLogger(__name__)
 
@@ -68,9 +72,6 @@ def evaluate_scenes(
         on_failure: Called with the name of a broken scene and the reason.
         progress: Reports the progress, as one stage.
 
-    Returns:
-        The results, and the reasons for the scenes without one.
-
     Raises:
         WeightsError: If the weights cannot be read.
         BackendUnavailableError: If the requested device or matcher is not available.
@@ -91,17 +92,22 @@ def evaluate_scenes(
                     on_failure(source.name, failed[source.name])
             else:
                 results.append(result)
-    return DepthReport(
-        date=datetime.datetime.now(datetime.UTC).date(),
-        weights_sha256=weights_hash(options.refine.weights),
-        refine=options.refine,
-        stereo=options.stereo,
-        max_residual=options.max_residual,
-        hardware=hardware(),
-        versions=versions(),
-        scenes=tuple(results),
-        failed=failed,
-    )
+    return DepthReport(about=_about(options), scenes=tuple(results), failed=failed)
+
+
+def _about(options: EvaluationOptions) -> dict[str, Any]:
+    refine = options.refine.to_mapping()
+    return {
+        "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
+        "weights_sha256": weights_hash(options.refine.weights),
+        "options": {
+            "refine": {name: refine[name] for name in _REFINE_OPTIONS},
+            "stereo": options.stereo.to_mapping(),
+            "max_residual": options.max_residual,
+        },
+        "hardware": hardware(),
+        "versions": versions(),
+    }
 
 
 def _measure_scene(
@@ -112,24 +118,22 @@ def _measure_scene(
     on_share: Callable[[float], None],
 ) -> SceneResult:
     num_sources = max(1, network.config.num_sources)
-    wanted = SampleOptions(stereo=options.stereo, num_sources=num_sources)
-
-    def measured(sample: DepthSample) -> SampleResult:
+    lazy = source.read(SampleOptions(stereo=options.stereo, num_sources=num_sources))
+    results = []
+    for read_sample in lazy:
+        sample = read_sample()
         logger.debug("%s: %s", source.name, sample.name)
         initial = initial_depth(
             source.name, sample, backend, options.stereo, options.cache
         )
         if not (initial.depth > 0).any():
             raise WorkspaceError(f"{sample.name}: no pixel has an initial depth.")
-        return measure_sample(
-            sample, initial, network, options.refine, options.max_residual
+        results.append(
+            measure_sample(
+                sample, initial, network, options.refine, options.max_residual
+            )
         )
-
-    samples = source.read(wanted)
-    results = []
-    for read_sample in samples:
-        results.append(measured(read_sample()))
-        on_share(1 / len(samples))
+        on_share(1 / len(lazy))
     return SceneResult(name=source.name, samples=tuple(results))
 
 

@@ -60,45 +60,32 @@ class MatchCache:
     ) -> Matching:
         """The result of an earlier call for the same input, else of `match`.
 
-        Args:
-            name: Start of the name of the file.
-            views: The reference and its sources.
-            depth_range: Nearest and farthest depth, in units.
-            config: Options of the matcher.
-            match: Called if the cache has no result.
-
-        Raises:
-            WorkspaceError: If the file cannot be written.
+        The file's name starts with `name`; WorkspaceError if it cannot be written.
         """
-        path = self._path(name, views, depth_range, config)
+        path = self.folder / f"{name}-{_digest(views, depth_range, config)}.npz"
         if path.is_file():
             return _read(path)
         matching = match()
         data = io.BytesIO()
-        arrays: dict[str, Any] = {
-            _SOURCE.format(index): depth
-            for index, depth in enumerate(matching.source_depths)
-        }
+        sources = enumerate(matching.source_depths)
+        arrays: dict[str, Any] = {_SOURCE.format(i): depth for i, depth in sources}
         np.savez(data, depth=matching.depth, cpu_s=matching.cpu_s, **arrays)
         write_whole(path, data.getvalue())
         return matching
 
-    def _path(
-        self,
-        name: str,
-        views: Sequence[MatchView],
-        depth_range: tuple[float, float],
-        config: StereoConfig,
-    ) -> Path:
-        text = json.dumps([_FORMAT, config.to_mapping(), depth_range], sort_keys=True)
-        digest = hashlib.sha256(text.encode())
-        for view in views:
-            for array in (view.gray, view.K, view.cam_from_world):
-                digest.update(str(array.shape).encode() + array.tobytes())
-        for folder in resdepth_colmap.matching.__path__:
-            for source in sorted(Path(folder).glob("*.py")):
-                digest.update(source.read_bytes())
-        return self.folder / f"{name}-{digest.hexdigest()[:_HASH_LENGTH]}.npz"
+
+def _digest(
+    views: Sequence[MatchView], depth_range: tuple[float, float], config: StereoConfig
+) -> str:
+    text = json.dumps([_FORMAT, config.to_mapping(), depth_range], sort_keys=True)
+    digest = hashlib.sha256(text.encode())
+    for view in views:
+        for array in (view.gray, view.K, view.cam_from_world):
+            digest.update(str(array.shape).encode() + array.tobytes())
+    for folder in resdepth_colmap.matching.__path__:
+        for source in sorted(Path(folder).glob("*.py")):
+            digest.update(source.read_bytes())
+    return digest.hexdigest()[:_HASH_LENGTH]
 
 
 def _read(path: Path) -> Matching:

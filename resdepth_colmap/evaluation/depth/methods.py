@@ -8,7 +8,6 @@ import dataclasses
 from collections.abc import Mapping
 
 import numpy as np
-import numpy.typing as npt
 
 from resdepth_colmap.config import RefineConfig
 from resdepth_colmap.evaluation.datasets.sample import DepthSample, InitialDepth
@@ -59,23 +58,14 @@ def measure_sample(
 ) -> SampleResult:
     """Refine the initial depth and compare all three maps with the ground truth.
 
-    Args:
-        sample: The view and its ground truth.
-        initial: Its initial depth, of the same size.
-        network: On the device to run on.
-        config: Outer and inner iterations, and tiles.
-        max_residual: Larger errors, in units, are discarded; None = no limit.
+    Errors beyond `max_residual`, in units, are discarded; None = no limit.
     """
-    truth, depth = sample.truth, initial.depth
-    refined = refine_sample(sample, initial, network, config)
-    methods = {
-        "unfiltered": depth,
-        "median": median_filtered(depth),
-        "refined": refined.depth,
-    }
+    truth, depth, seen = sample.truth, initial.depth, sample.seen
+    refined, cpu_s = refine_sample(sample, initial, network, config)
+    maps = (depth, median_filtered(depth), refined)
+    methods = dict(zip(METHODS, maps, strict=True))
     edges = edge_region(truth)
     regions = {"all": None, "edges": edges, "flat": ~edges}
-    seen = sample.seen
     return SampleResult(
         name=sample.name,
         origin=initial.origin,
@@ -89,19 +79,17 @@ def measure_sample(
         seen=None
         if seen is None
         else PooledErrors.of(depth, truth, seen, max_residual),
-        seen_median_relative_error=None
-        if seen is None
-        else _median_relative_error(sample, initial, seen),
+        seen_median_relative_error=_median_relative_error(sample, initial),
         megapixels=sample.megapixels,
         matching_cpu_s=initial.cpu_s,
-        refining_cpu_s=refined.cpu_s,
+        refining_cpu_s=cpu_s,
     )
 
 
-def _median_relative_error(
-    sample: DepthSample, initial: InitialDepth, seen: npt.NDArray[np.bool_]
-) -> float:
-    counted = seen & (sample.truth > 0)
+def _median_relative_error(sample: DepthSample, initial: InitialDepth) -> float | None:
+    if sample.seen is None:
+        return None
+    counted = sample.seen & (sample.truth > 0)
     if not counted.any():
         return float("nan")
     truth = sample.truth[counted]

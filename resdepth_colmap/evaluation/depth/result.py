@@ -1,27 +1,17 @@
 """The result of an evaluation of depth maps, scene by scene and overall."""
 
 import dataclasses
-import datetime
 import math
 import statistics
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from resdepth_colmap.config import RefineConfig, StereoConfig
 from resdepth_colmap.evaluation.depth.methods import METHODS, REGIONS, SampleResult
 from resdepth_colmap.evaluation.metrics.pooled_metrics import PooledErrors, pooled
 from resdepth_colmap.evaluation.plain import finite_mean, plain
 
 Errors = Mapping[str, Mapping[str, PooledErrors]]
 """By region, then by method."""
-
-_REFINE_OPTIONS = (
-    "inner_iterations",
-    "outer_iterations",
-    "update_gating",
-    "tile_px",
-    "overlap_px",
-)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -39,7 +29,7 @@ class SceneResult:
     @property
     def errors(self) -> Errors:
         """Over the pixels of all views."""
-        return pooled_errors([sample.errors for sample in self.samples])
+        return _pooled_errors([sample.errors for sample in self.samples])
 
     def ratio(self, error: str) -> float:
         """An error, "mae" or "medae", refined over unfiltered; NaN if that is 0."""
@@ -90,66 +80,38 @@ class SceneResult:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class DepthReport:
-    """The result of an evaluation, and its options.
+    """The result of an evaluation.
 
     Attributes:
-        date: Day of the measurement.
-        weights_sha256: Hash of the weights file.
-        refine: Options of the refinement.
-        stereo: Options of the matcher.
-        max_residual: Larger errors were discarded, in units; None = no limit.
-        hardware: The machine that measured.
-        versions: Of Python and the main packages.
+        about: Date, weights, options, hardware and versions, ready for JSON.
         scenes: The results of the scenes.
         failed: The reasons for scenes without a result, by name.
     """
 
-    date: datetime.date
-    weights_sha256: str
-    refine: RefineConfig
-    stereo: StereoConfig
-    max_residual: float | None
-    hardware: str
-    versions: Mapping[str, str]
+    about: Mapping[str, Any]
     scenes: tuple[SceneResult, ...]
     failed: Mapping[str, str]
 
-    @property
-    def errors(self) -> Errors | None:
-        """Over the pixels of all scenes; None without any."""
-        if not self.scenes:
-            return None
-        return pooled_errors([scene.errors for scene in self.scenes])
-
     def to_mapping(self) -> dict[str, Any]:
         """Plain values, ready for JSON; without absolute paths."""
-        refine = self.refine.to_mapping()
-        errors = self.errors
+        errors = [scene.errors for scene in self.scenes]
+        ratios = {
+            f"{error}_ratio": [scene.ratio(error) for scene in self.scenes]
+            for error in ("mae", "medae")
+        }
         return {
-            "date": self.date.isoformat(),
-            "weights_sha256": self.weights_sha256,
-            "options": {
-                "refine": {name: refine[name] for name in _REFINE_OPTIONS},
-                "stereo": self.stereo.to_mapping(),
-                "max_residual": self.max_residual,
-            },
-            "hardware": self.hardware,
-            "versions": dict(self.versions),
+            **self.about,
             "scenes": {scene.name: scene.to_mapping() for scene in self.scenes},
-            "overall": None if errors is None else plain(_by_name(errors)),
+            "overall": plain(_by_name(_pooled_errors(errors))) if errors else None,
             "mean": {
-                f"{error}_ratio": plain(self._mean_ratio(error))
-                for error in ("mae", "medae")
+                name: plain(statistics.fmean(values)) if values else None
+                for name, values in ratios.items()
             },
             "failed": dict(self.failed),
         }
 
-    def _mean_ratio(self, error: str) -> float:
-        ratios = [scene.ratio(error) for scene in self.scenes]
-        return statistics.fmean(ratios) if ratios else math.nan
 
-
-def pooled_errors(errors: Sequence[Errors]) -> Errors:
+def _pooled_errors(errors: Sequence[Errors]) -> Errors:
     """The errors over all pixels of several results, by region and method."""
     return {
         region: {

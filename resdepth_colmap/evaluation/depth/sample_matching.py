@@ -12,7 +12,6 @@ from resdepth_colmap.evaluation.depth.colmap_pair import match_by_colmap
 from resdepth_colmap.evaluation.depth.match_cache import MatchCache, Matching
 from resdepth_colmap.matching.patch_match import MatchView, match_view
 from resdepth_colmap.pipeline.stereo.warm_up import warm_up
-from resdepth_colmap.scene import DepthMap
 
 ORIGINS = {
     StereoBackend.CPU: "our PatchMatch (CPU)",
@@ -54,14 +53,9 @@ def initial_depth(
     config: StereoConfig,
     cache: MatchCache | None = None,
 ) -> InitialDepth:
-    """The depth that the refinement of a sample starts from.
+    """The depth that the refinement of a sample starts from: existing or matched.
 
-    Args:
-        scene: Name of its scene, for the file in the cache.
-        sample: The view; existing depth is used.
-        backend: The matcher, where there is none.
-        config: Options of the matcher.
-        cache: Keeps matched depth.
+    `scene` is the name of its scene, for the file in the cache.
     """
     if sample.initial is not None:
         return sample.initial
@@ -101,15 +95,17 @@ def _match(
 def _match_here(
     views: Sequence[MatchView], depth_range: tuple[float, float], config: StereoConfig
 ) -> Matching:
-    """Match the first view, in both passes unless `geom_consistency` is off.
-
-    The seconds leave out the photometric maps of the sources, which the geometric pass
-    and the refinement use: in a workspace each of them is matched once.
-    """
+    """Match the first view, in both passes unless `geom_consistency` is off."""
+    # The seconds leave out the photometric maps of the sources, which the geometric
+    # pass and the refinement use: in a workspace each of them is matched once.
     start = time.process_time()
     found = match_view(views[0], views[1:], depth_range, config)
     cpu_s = time.process_time() - start
-    source_depths = _source_depths(views, depth_range, config)
+    source_depths = []
+    for index in range(1, len(views)):
+        others = [*views[:index], *views[index + 1 :]]
+        source = match_view(views[index], others, depth_range, config)
+        source_depths.append(source.depth)
     if config.geom_consistency:
         start = time.process_time()
         found = match_view(
@@ -119,17 +115,6 @@ def _match_here(
         )
         cpu_s += time.process_time() - start
     return Matching(depth=found.depth, cpu_s=cpu_s, source_depths=tuple(source_depths))
-
-
-def _source_depths(
-    views: Sequence[MatchView], depth_range: tuple[float, float], config: StereoConfig
-) -> list[DepthMap]:
-    """Photometric depth of every view but the first, each matched with all others."""
-    found = []
-    for index in range(1, len(views)):
-        others = [*views[:index], *views[index + 1 :]]
-        found.append(match_view(views[index], others, depth_range, config).depth)
-    return found
 
 
 @functools.cache

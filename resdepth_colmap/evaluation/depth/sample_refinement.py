@@ -48,12 +48,6 @@ def refine_sample(
 
     Earlier outer iterations refine the sources, too, from each other and from the
     reference, as far as the sample has the views for it.
-
-    Args:
-        sample: The views.
-        initial: Depth of the reference, and of the sources where there is any.
-        network: On the device to run on.
-        config: Outer and inner iterations, and tiles.
     """
     views = _views(sample, initial)
     num_earlier = config.outer_iterations - 1 if network.config.source_depth else 0
@@ -95,7 +89,7 @@ def _inputs(
 ) -> ViewInputs:
     own = views[index]
     assert own.depth is not None  # noqa: S101 (for the type checker)
-    others = [view.view for i, view in enumerate(views) if i != index]
+
     return ViewInputs(
         depth=own.depth,
         gray=own.view.gray,
@@ -107,7 +101,8 @@ def _inputs(
                 K=source.K,
                 source_from_reference=cam_from_cam(source, own.view),
             )
-            for source in others
+            for i, (source, *_) in enumerate(views)
+            if i != index
         ),
         source_maps=tuple(
             SourceMap(

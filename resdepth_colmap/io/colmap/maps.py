@@ -71,7 +71,7 @@ def read_normal_map(path: Path) -> NormalMap:
             one channel, or if no normal is finite.
     """
     normals = np.moveaxis(read_planes(path, num_channels=3), 0, 2)
-    finite = np.isfinite(normals).all(axis=2, keepdims=True)
+    finite = np.asarray(np.isfinite(normals).all(axis=2, keepdims=True))
     _check_any(path, finite, "normals are NaN or infinite")
     return np.ascontiguousarray(np.where(finite, normals, np.float32(0)))
 
