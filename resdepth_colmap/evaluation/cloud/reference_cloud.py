@@ -84,16 +84,12 @@ class ReferenceCloud:
         }
 
     def score(self, points: Points, progress: Progress) -> CloudScores:
-        """Score a cloud.
+        """Score the points of a cloud, in the world, shape (M, 3).
 
         A point counts for the accuracy if it projects to a pixel of known true depth in
         some view. The shares of right points are averaged over voxels, so that dense
-        and sparse regions weigh alike.
-
-        Args:
-            points: In the world, shape (M, 3); those that are not finite are left out.
-                The scores of a cloud without points are 0.
-            progress: Reports the progress.
+        and sparse regions weigh alike. Points that are not finite are left out; the
+        scores of a cloud without points are 0.
         """
         points = points[np.isfinite(points).all(axis=1)]
         observed = points[self._is_observed(points)]
@@ -125,16 +121,12 @@ class ReferenceCloud:
 def read_reference_cloud(
     workspace: Workspace, scene: Scene, tolerances: Sequence[float]
 ) -> ReferenceCloud | None:
-    """Read `ground_truth/` of a workspace.
+    """Read `ground_truth/<image>.bin` of some or all views; None if there is none.
 
     Args:
-        workspace: With `ground_truth/<image>.bin`, in COLMAP's map format, of some or
-            all views.
+        workspace: Has the maps, in COLMAP's format.
         scene: Its views.
         tolerances: In units; () = 1 % and 2 % of the mean true depth.
-
-    Returns:
-        The reference cloud; None if no view has ground truth.
 
     Raises:
         WorkspaceError: If a map is broken or of another image, or no map has a depth.
@@ -186,9 +178,7 @@ def _thinned(points: Points, voxel_size: float) -> Points:
     cells = np.floor(points.astype(np.float64) / voxel_size).astype(np.int64)
     cells -= cells.min(axis=0)
     sizes = cells.max(axis=0) + 1
-    if np.log2(sizes.astype(np.float64)).sum() < 62:
-        keys = (cells[:, 0] * sizes[1] + cells[:, 1]) * sizes[2] + cells[:, 2]
-        _, first = np.unique(keys, return_index=True)
-    else:
-        _, first = np.unique(cells, axis=0, return_index=True)
+    fits = np.log2(sizes.astype(np.float64)).sum() < 62
+    keys = np.ravel_multi_index(tuple(cells.T), tuple(sizes)) if fits else cells
+    _, first = np.unique(keys, axis=0, return_index=True)
     return points[np.sort(first)]

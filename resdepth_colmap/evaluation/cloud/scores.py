@@ -82,7 +82,7 @@ def cloud_scores(
     config: CloudConfig,
     progress: Progress | None = None,
 ) -> CloudScores:
-    """Score a cloud against laser scans.
+    """Score a cloud against laser scans; ValueError if these have no point.
 
     Args:
         points: Coordinates of the cloud in the world of the scans, in metres, shape
@@ -91,9 +91,6 @@ def cloud_scores(
         scans: At least one scan with a point.
         config: Tolerances, voxels and beam.
         progress: Reports the progress.
-
-    Raises:
-        ValueError: If the scans have no point.
     """
     progress = progress or SilentProgress()
     points = _finite(points, "the cloud")
@@ -103,9 +100,13 @@ def cloud_scores(
     if len(world) == 0:
         raise ValueError("the scans have no point.")
     _warn_of_misfit(points, world)
-    completeness = _completeness(points, world, config, progress)
+    with progress.stage("Completeness", len(world)) as advance:
+        levels = completeness_levels(world, points, config.tolerances, advance)
+    grids, counted = VoxelGrids(world, config.voxel_size), np.ones(len(world), bool)
+    indices = range(len(config.tolerances))
+    completeness = tuple(grids.mean_share(levels <= it, counted) for it in indices)
     num_scan_points = len(world)
-    del world
+    del world, grids
     accuracy = _accuracy(points, list(zip(local, poses, strict=True)), config, progress)
     return CloudScores(
         tolerances=config.tolerances,
@@ -113,19 +114,6 @@ def cloud_scores(
         completeness=completeness,
         num_points=len(points),
         num_scan_points=num_scan_points,
-    )
-
-
-def _completeness(
-    points: Points, world: Points, config: CloudConfig, progress: Progress
-) -> tuple[float, ...]:
-    with progress.stage("Completeness", len(world)) as advance:
-        levels = completeness_levels(world, points, config.tolerances, advance)
-    grids = VoxelGrids(world, config.voxel_size)
-    counted = np.ones(len(world), bool)
-    return tuple(
-        grids.mean_share(levels <= index, counted)
-        for index in range(len(config.tolerances))
     )
 
 

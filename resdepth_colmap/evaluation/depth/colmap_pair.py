@@ -57,7 +57,7 @@ def match_by_colmap(
 
 
 def write_pair_workspace(path: Path, views: Sequence[MatchView]) -> None:
-    """Write a dense workspace, images of 8 bits, in which COLMAP matches the first view.
+    """Write a dense workspace, images of 8 bits, for COLMAP to match the first view.
 
     Raises:
         WorkspaceError: If a file cannot be written.

@@ -52,14 +52,12 @@ class DepthMetrics:
         num_missing: Number of those without a depth.
         num_discarded: Number of those whose residual is beyond the limit.
         mae: Mean absolute error, in workspace units; NaN without valid pixels.
-        rmse: Root mean square error, in workspace units; likewise.
-        medae: Median absolute error, in workspace units; likewise.
+        rmse: Root mean square error, likewise.
+        medae: Median absolute error, likewise.
         bad_1: Share of `num_pixels` off by more than 1 % of the true depth, in 0..1;
             missing and discarded pixels are bad. NaN without pixels.
         bad_2: The same for 2 %.
-        bad_1cm: The same for 0.01 workspace units, a centimetre where that is a metre.
-        bad_2cm: The same for 0.02 units.
-        bad_5cm: The same for 0.05 units.
+        bad_1cm: The same for 0.01 workspace units; bad_2cm, bad_5cm likewise.
     """
 
     num_pixels: int
@@ -117,7 +115,7 @@ def find_residuals(
     region: npt.NDArray[np.bool_] | None = None,
     max_residual: float | None = PAPER_MAX_RESIDUAL,
 ) -> Residuals:
-    """Compare a depth map with the ground truth.
+    """Compare a depth map with the ground truth; ValueError if the shapes differ.
 
     Args:
         depth: Shape (H, W), in workspace units; 0 = no depth.
@@ -125,14 +123,9 @@ def find_residuals(
         region: Where to compare, same shape; None = everywhere.
         max_residual: Absolute errors beyond it, in workspace units, are invalid; None =
             no limit.
-
-    Raises:
-        ValueError: If the shapes differ.
     """
-    if depth.shape != truth.shape or (
-        region is not None and region.shape != truth.shape
-    ):
-        shapes = [depth.shape, truth.shape, None if region is None else region.shape]
+    shapes = [it.shape for it in (depth, truth, region) if it is not None]
+    if len(set(shapes)) > 1:
         raise ValueError(f"shapes of depth, truth and region differ: {shapes}.")
     known = truth > 0 if region is None else (truth > 0) & region
     true_depth = truth[known].astype(np.float64)
@@ -152,10 +145,7 @@ def median_filtered(depth: DepthMap, size: int = 5) -> DepthMap:
 
     Args:
         depth: Shape (H, W), in workspace units; 0 = no depth.
-        size: Side of the window, in pixels; odd.
-
-    Raises:
-        ValueError: If the size is even or less than 1.
+        size: Side of the window, in pixels; odd, else ValueError.
     """
     if size < 1 or size % 2 == 0:
         raise ValueError(f"{size=} but expected an odd number of pixels.")
@@ -165,16 +155,11 @@ def median_filtered(depth: DepthMap, size: int = 5) -> DepthMap:
     for top in range(0, depth.shape[0], _ROWS_AT_ONCE):
         bottom = min(top + _ROWS_AT_ONCE, depth.shape[0])
         band = padded[top : bottom + size - 1]
-        result[top:bottom] = _lower_median(band, size)
+        windows = np.lib.stride_tricks.sliding_window_view(band, (size, size))
+        values = np.sort(windows.reshape(*windows.shape[:2], -1), axis=2)  # holes last
+        middle = np.maximum(np.isfinite(values).sum(axis=2, keepdims=True) - 1, 0) // 2
+        result[top:bottom] = np.take_along_axis(values, middle, axis=2)[..., 0]
     return np.where(present, result, np.float32(0))
-
-
-def _lower_median(padded: DepthMap, size: int) -> DepthMap:
-    windows = np.lib.stride_tricks.sliding_window_view(padded, (size, size))
-    values = np.sort(windows.reshape(*windows.shape[:2], -1), axis=2)  # holes last
-    middle = np.maximum(np.isfinite(values).sum(axis=2) - 1, 0) // 2
-    median: DepthMap = np.take_along_axis(values, middle[..., np.newaxis], axis=2)
-    return median[..., 0]
 
 
 EDGE_RADIUS_PX = 4
@@ -189,14 +174,10 @@ def edge_region(truth: DepthMap) -> npt.NDArray[np.bool_]:
     have holes along edges; the window reaches across them.
 
     Args:
-        truth: True depth, shape (H, W), in units; 0 = unknown.
-
-    Returns:
-        Shape (H, W), bool; False where the truth is unknown.
+        truth: True depth, shape (H, W), in units; 0 = unknown, which is False.
     """
     known = truth > 0
     size = 2 * EDGE_RADIUS_PX + 1
     nearest = minimum_filter(np.where(known, truth, np.inf), size, mode="nearest")
     farthest = maximum_filter(np.where(known, truth, 0), size, mode="nearest")
-    edge: npt.NDArray[np.bool_] = known & (farthest > EDGE_RATIO * nearest)
-    return edge
+    return np.asarray(known & (farthest > EDGE_RATIO * nearest))

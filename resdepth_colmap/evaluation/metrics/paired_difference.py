@@ -13,9 +13,6 @@ from scipy.stats import bootstrap
 
 from resdepth_colmap.evaluation.plain import plain
 
-NUM_RESAMPLES = 2000
-CONFIDENCE_LEVEL = 0.95
-_SEED = 0
 _SAME = 1e-9  # rounding of two equal means
 
 
@@ -54,7 +51,7 @@ def paired_difference(
     Args:
         first: The measure by the first method, one value per view or tile, shape (N,);
             NaN = none.
-        second: The same by the second method, in the same order.
+        second: Likewise by the second method.
         resample: Whether to compute the interval. The bootstrap needs independent
             pairs, which the tiles of a view are not.
     """
@@ -77,12 +74,8 @@ def paired_difference(
 
 def _interval(pairs: npt.NDArray[np.float64]) -> tuple[float, float]:
     """Percentile bootstrap of the mean (Efron and Tibshirani 1993, chapter 13)."""
+    rng, options = np.random.default_rng(0), {"method": "percentile"}
     found = bootstrap(
-        (pairs,),
-        np.mean,
-        n_resamples=NUM_RESAMPLES,
-        confidence_level=CONFIDENCE_LEVEL,
-        method="percentile",
-        random_state=np.random.default_rng(_SEED),
+        (pairs,), np.mean, n_resamples=2000, random_state=rng, **options
     ).confidence_interval
     return float(found.low), float(found.high)

@@ -37,12 +37,7 @@ def coverage(maps: ViewMaps) -> dict[str, Sums]:
 
 
 def against_truth(maps: ViewMaps, truth: DepthMap) -> dict[str, Sums]:
-    """Shares of pixels near the true depth, by method.
-
-    Args:
-        maps: The view.
-        truth: Its true depth, of the size of the maps, shape (H, W); 0 = unknown.
-    """
+    """Shares of pixels near the true depth, shape (H, W), 0 = unknown, by method."""
     known = truth > 0
     common = known & maps.common
     found: dict[str, Sums] = {}
@@ -76,8 +71,8 @@ def sparse_points(maps: ViewMaps, points: SparsePoints) -> dict[str, Sums]:
         is_near = (at_point > 0) & (np.abs(at_point - z) <= WITHIN * z)
         found[method] = {}
         for half, name in enumerate(("points_even", "points_odd")):
-            for suffix, kept in (("", parity == half), ("_common", common)):
-                counted = kept & (parity == half)
+            in_half = parity == half
+            for suffix, counted in (("", in_half), ("_common", in_half & common)):
                 found[method][name + suffix] = _sums_at(
                     pixels[counted], is_near[counted], maps.shape
                 )

@@ -83,8 +83,8 @@ def with_common(name: str, totals: npt.NDArray[Any]) -> dict[str, TileSums]:
 
     Args:
         name: Of the measure.
-        totals: Sum and number of the values at each pixel, then both at the pixels that
-            every method covers, shape (4, H, W).
+        totals: Sums and counts at each pixel, then both where every method covers it,
+            shape (4, H, W).
     """
     return {
         name: TileSums.of(totals[0], totals[1]),
