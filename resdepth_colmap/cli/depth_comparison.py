@@ -24,16 +24,10 @@ if TYPE_CHECKING:
     from resdepth_colmap.evaluation.markdown import Measured
 
 _IRRELEVANT = (
-    "max_image_size",
-    "min_triangulation_angle",
-    "filter",
-    "filter_min_ncc",
-    "filter_min_triangulation_angle",
-    "filter_min_num_consistent",
-    "filter_geom_consistency_max_cost",
-    "write_consistency_graph",
-    "mask_path",
-    "cache_size",
+    *("max_image_size", "min_triangulation_angle", "filter", "filter_min_ncc"),
+    *("filter_min_triangulation_angle", "filter_min_num_consistent"),
+    *("filter_geom_consistency_max_cost", "write_consistency_graph"),
+    *("mask_path", "cache_size"),
 )
 """Options of StereoConfig that do not change an unfiltered map of full size."""
 
@@ -50,22 +44,13 @@ _max_residual = click.option(
 def evaluation_command_options(
     cache_help: str, *skip: str
 ) -> Callable[[Command], Command]:
-    """The options of refinement, matcher, errors, cache and result.
-
-    Args:
-        cache_help: Help text of --cache.
-        skip: Attributes of StereoConfig to leave out.
-    """
+    """The options of refinement, matcher (without `skip`), errors, cache and result."""
     cache = click.option(
         "--cache", type=click.Path(path_type=Path, file_okay=False), help=cache_help
     )
+    iterations = ("inner_iterations", "outer_iterations")
     refine = config_options(
-        RefineConfig,
-        "inner_iterations",
-        "outer_iterations",
-        "update_gating",
-        "weights",
-        "device",
+        RefineConfig, *iterations, "update_gating", "weights", "device"
     )
     stereo = config_options(StereoConfig, skip=(*_IRRELEVANT, *skip))
 
@@ -116,11 +101,8 @@ def run_evaluation(
     measured = {"command": command_line(skip=UNRECORDED), **report.to_mapping()}
     if protocol is not None:
         measured["protocol"] = protocol
-    as_json = values["as_json"]
+    as_json, output = values["as_json"], values["output"]
     show_result(
-        measured,
-        lambda result: click.echo(table(result)),
-        as_json=as_json,
-        output=values["output"],
+        measured, lambda it: click.echo(table(it)), as_json=as_json, output=output
     )
     exit_if_failed(report.failed, len(sources), "scenes", as_json=as_json)

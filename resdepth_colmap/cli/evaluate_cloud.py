@@ -67,18 +67,14 @@ def cloud(
 
 
 def _show(scores: "CloudScores") -> None:
-    from rich.table import Table
-
     from resdepth_colmap.cli.printed import show_line, show_table
 
     show_line("cloud", f"{scores.num_points:,} points")
     show_line("scans", f"{scores.num_scan_points:,} points")
-    table = Table()
-    for header in ("tolerance, m", "accuracy", "completeness", "F1"):
-        table.add_column(header, justify="right")
-    rows = zip(
-        scores.tolerances, scores.accuracy, scores.completeness, scores.f1, strict=True
-    )
-    for tolerance, *shares in rows:
-        table.add_row(f"{tolerance:g}", *(f"{100 * share:.2f} %" for share in shares))
-    show_table(table)
+    shares = zip(scores.accuracy, scores.completeness, scores.f1, strict=True)
+    rows = [
+        [f"{tolerance:g}", *(f"{100 * share:.2f} %" for share in row)]
+        for tolerance, row in zip(scores.tolerances, shares, strict=True)
+    ]
+    headers = ("tolerance, m", "accuracy", "completeness", "F1")
+    show_table(headers, rows, num_left=0)

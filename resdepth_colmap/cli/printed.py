@@ -5,11 +5,8 @@ from typing import TYPE_CHECKING
 import click
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
-    from rich.table import Table
-
-    from resdepth_colmap.evaluation.metrics.depth_metrics import DepthMetrics
     from resdepth_colmap.pipeline.info import Inspection
     from resdepth_colmap.pipeline.run import RunResult
     from resdepth_colmap.report.image_maps import ImageErrors
@@ -22,12 +19,32 @@ def show_line(label: str, text: object) -> None:
     click.echo(f"{label:<{LABEL_WIDTH}}{text}")
 
 
-def show_table(table: "Table") -> None:
-    """A table on stdout; never cut off, also where stdout is no terminal."""
-    from rich.console import Console
+def show_table(
+    headers: "Sequence[str]",
+    rows: "Iterable[Sequence[str] | None]",
+    title: str | None = None,
+    num_left: int = 1,
+) -> None:
+    """A table on stdout; never cut off, also where stdout is no terminal.
 
-    console = Console(soft_wrap=True, highlight=False)
-    console.print(table)
+    Args:
+        headers: Of the columns.
+        rows: Cells; None draws a line.
+        title: Above the table.
+        num_left: How many columns are text, aligned left; the others are numbers.
+    """
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(title=title)
+    for index, header in enumerate(headers):
+        table.add_column(header, justify="left" if index < num_left else "right")
+    for row in rows:
+        if row is None:
+            table.add_section()
+        else:
+            table.add_row(*row)
+    Console(soft_wrap=True, highlight=False).print(table)
 
 
 def duration(seconds: float) -> str:
@@ -72,26 +89,21 @@ def show_inspection(found: "Inspection") -> None:
     show_line("sparse points", f"{found.num_points:,}" if found.num_points else "none")
     show_line("cfg files", ", ".join(found.cfg_files) or "none")
     if found.maps:
-        _show_maps(found)
+        rows = [
+            (
+                kind,
+                f"{summary.num_maps} of {found.num_views}",
+                f"{summary.num_normal_maps} of {found.num_views}",
+                f"{summary.filled:.1%} (mean of {summary.num_read})",
+            )
+            for kind, summary in found.maps.items()
+        ]
+        show_table(("maps", "depth", "normal", "filled"), rows, num_left=4)
     else:
         show_line("depth maps", "none")
     _show_plan(found)
     for warning in found.warnings:
         show_line("warning", warning)
-
-
-def _show_maps(found: "Inspection") -> None:
-    from rich.table import Table
-
-    table = Table("maps", "depth", "normal", "filled")
-    for kind, summary in found.maps.items():
-        table.add_row(
-            kind,
-            f"{summary.num_maps} of {found.num_views}",
-            f"{summary.num_normal_maps} of {found.num_views}",
-            f"{summary.filled:.1%} (mean of {summary.num_read})",
-        )
-    show_table(table)
 
 
 def _show_plan(found: "Inspection") -> None:
@@ -115,32 +127,21 @@ def _show_plan(found: "Inspection") -> None:
 
 def show_comparison(comparisons: "Sequence[ImageErrors]") -> None:
     """The error of each image's depth before and after, and the mean over them."""
-    from rich.table import Table
-
-    table = Table("image", "mean error", "refined", "off by > 2 %", "refined")
-    for comparison in comparisons:
-        table.add_row(comparison.name, *_errors(comparison.before, comparison.after))
-    rows = [(c.before, c.after) for c in comparisons]
-    mean = [
-        sum(getattr(row[index], name) for row in rows) / len(rows)
-        for name in ("mae", "bad_2")
-        for index in (0, 1)
-    ]
-    table.add_section()
-    table.add_row("mean", *_shown_errors(*mean))
-    show_table(table)
+    errors = {
+        name: (before.mae, after.mae, before.bad_2, after.bad_2)
+        for name, before, after in comparisons
+    }
+    columns = zip(*errors.values(), strict=True)
+    mean = [sum(column) / len(comparisons) for column in columns]
+    rows = [_error_row(name, *values) for name, values in errors.items()]
+    headers = ("image", "mean error", "refined", "off by > 2 %", "refined")
+    show_table(headers, [*rows, None, _error_row("mean", *mean)], num_left=5)
 
 
-def _errors(before: "DepthMetrics", after: "DepthMetrics") -> tuple[str, ...]:
-    return _shown_errors(before.mae, after.mae, before.bad_2, after.bad_2)
-
-
-def _shown_errors(
-    mae_before: float, mae_after: float, bad_before: float, bad_after: float
+def _error_row(
+    name: str, mae_before: float, mae_after: float, bad_before: float, bad_after: float
 ) -> tuple[str, ...]:
-    return (
-        f"{mae_before:.4f}",
-        f"{mae_after:.4f} ({mae_after / mae_before - 1.0:+.0%})" if mae_before else "",
-        f"{bad_before:.1%}",
-        f"{bad_after:.1%}",
+    change = (
+        f"{mae_after:.4f} ({mae_after / mae_before - 1:+.0%})" if mae_before else ""
     )
+    return (name, f"{mae_before:.4f}", change, f"{bad_before:.1%}", f"{bad_after:.1%}")

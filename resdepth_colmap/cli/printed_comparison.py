@@ -1,6 +1,6 @@
 """The tables that `compare` prints."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import click
@@ -39,23 +39,17 @@ def _show_workspace(name: str, found: Mapping[str, Any]) -> None:
 
 
 def _show_clouds(clouds: Mapping[str, Any]) -> None:
-    from rich.table import Table
-
-    table = Table(title="clouds")
-    for header in ("fusion", "method"):
-        table.add_column(header)
-    for header in ("points", "tolerance", "accuracy", "complete", "F1"):
-        table.add_column(header, justify="right")
+    rows: list[list[str] | None] = []
     notes: dict[str, list[str]] = {}
     for fuser, methods in clouds.items():
         for method, cloud in methods.items():
-            for row in _cloud_rows(cloud):
-                table.add_row(_FUSERS[fuser], method, *row)
+            rows += [[_FUSERS[fuser], method, *row] for row in _cloud_rows(cloud)]
             if cloud["note"]:
                 note = f"{_FUSERS[fuser]}: {cloud['note']}"
                 notes.setdefault(note, []).append(method)
-        table.add_section()
-    show_table(table)
+        rows.append(None)
+    scores = ("points", "tolerance", "accuracy", "complete", "F1")
+    show_table(("fusion", "method", *scores), rows, "clouds", num_left=2)
     for note, of_methods in notes.items():
         show_line("note", f"{', '.join(of_methods)}: {note}.")
 
@@ -85,51 +79,33 @@ def _show_measures(found: Mapping[str, Any]) -> None:
         for name in MEASURES
         if any(it[name] is not None for it in methods.values())
     ]
-    _show_means(methods, measured)
+    rows = [
+        [name, *(_percent(values[name], ".1f") for values in methods.values())]
+        for name in measured
+    ]
+    show_table(("measure, %", *methods), rows, "means over the views")
+    headers = ("points of 100", "mean", "95 %", "median", "better", "worse", "tiles")
     for pair, differences in found["paired"].items():
-        _show_differences(pair, differences, measured)
+        rows = [_difference_row(name, **differences[name]) for name in measured]
+        show_table(headers, rows, f"{pair}, view by view")
     width = max(map(len, measured)) + 2
     for name in measured:
         click.echo(f"{name:<{width}}{MEASURES[name]}")
 
 
-def _show_means(methods: Mapping[str, Any], measured: Sequence[str]) -> None:
-    from rich.table import Table
-
-    table = Table("measure, %", title="means over the views")
-    for method in methods:
-        table.add_column(method, justify="right")
-    for name in measured:
-        table.add_row(name, *(_percent(values[name]) for values in methods.values()))
-    show_table(table)
-
-
-def _show_differences(
-    pair: str, differences: Mapping[str, Any], measured: Sequence[str]
-) -> None:
-    from rich.table import Table
-
-    table = Table("points of 100", title=f"{pair}, view by view")
-    for header in ("mean", "95 %", "median", "better", "worse", "tiles"):
-        table.add_column(header, justify="right")
-    for name in measured:
-        views, tiles = differences[name]["views"], differences[name]["tiles"]
-        low, high = views["interval"] or (None, None)
-        table.add_row(
-            name,
-            _points(views["mean"]),
-            "-" if low is None else f"{_points(low)} {_points(high)}",
-            _points(views["median"]),
-            str(views["num_better"]),
-            str(views["num_worse"]),
-            f"{tiles['num_better']}:{tiles['num_worse']}",
-        )
-    show_table(table)
+def _difference_row(
+    name: str, views: Mapping[str, Any], tiles: Mapping[str, Any]
+) -> list[str]:
+    return [
+        name,
+        _percent(views["mean"]),
+        " ".join(map(_percent, views["interval"] or [None])),
+        _percent(views["median"]),
+        str(views["num_better"]),
+        str(views["num_worse"]),
+        f"{tiles['num_better']}:{tiles['num_worse']}",
+    ]
 
 
-def _percent(value: float | None) -> str:
-    return "-" if value is None else f"{100 * value:.1f}"
-
-
-def _points(value: float | None) -> str:
-    return "-" if value is None else f"{100 * value:+.1f}"
+def _percent(value: float | None, form: str = "+.1f") -> str:
+    return "-" if value is None else format(100 * value, form)

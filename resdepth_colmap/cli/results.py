@@ -47,17 +47,7 @@ def show_result(
     as_json: bool,
     output: Path | None,
 ) -> None:
-    """Print a result and write it to a file.
-
-    Args:
-        result: Plain values.
-        show: Prints the result as tables.
-        as_json: Whether to print JSON instead.
-        output: The file; None = none.
-
-    Raises:
-        WorkspaceError: If the file cannot be written.
-    """
+    """Print a result, as JSON or by `show`, and also write it to the file, if any."""
     from resdepth_colmap.io.files import write_whole
 
     text = json.dumps(result, indent=2, ensure_ascii=False)
@@ -72,14 +62,7 @@ def show_result(
 def exit_if_failed(
     failed: Collection[str], num_total: int, noun: str, *, as_json: bool
 ) -> None:
-    """List what failed, on stderr with JSON, and exit with code 1; return if nothing.
-
-    Args:
-        failed: Names of workspaces or scenes.
-        num_total: Number of those with and without a result.
-        noun: What they are, in the plural.
-        as_json: Whether stdout has JSON.
-    """
+    """List what failed, on stderr if stdout has JSON, and exit with code 1."""
     if failed:
         names = ", ".join(failed)
         summary = f"{len(failed)} of {num_total} {noun} failed: {names}"
@@ -88,11 +71,7 @@ def exit_if_failed(
 
 
 def command_line(skip: tuple[str, ...] = ()) -> str:
-    """What was typed, without the folders of this machine and without defaults.
-
-    Args:
-        skip: Names of parameters to leave out.
-    """
+    """What was typed, without folders of this machine, defaults and those options."""
     context = click.get_current_context()
     words = context.command_path.split()
     for parameter in context.command.params:

@@ -33,11 +33,7 @@ Bit 1 (not used to align images) says nothing against the depth."""
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Eth3dScene:
-    """Paths of one scene.
-
-    Attributes:
-        path: Its folder.
-    """
+    """Paths of the scene in a folder."""
 
     path: Path
 
@@ -118,11 +114,6 @@ def find_eth3d_scenes(root: Path) -> tuple[Eth3dScene, ...]:
 def read_raw_depth(path: Path, width_px: int, height_px: int) -> DepthMap:
     """Read the true depth of a distorted image: float32 without a header, +inf = none.
 
-    Args:
-        path: The file.
-        width_px: Width of the distorted image.
-        height_px: Its height.
-
     Returns:
         Depth along the optical axis, shape (H, W), in metres; 0 = not known.
 
@@ -146,13 +137,8 @@ def read_raw_depth(path: Path, width_px: int, height_px: int) -> DepthMap:
 def read_evaluated(path: Path, width_px: int, height_px: int) -> npt.NDArray[np.bool_]:
     """Read a mask: which pixels may be compared with the truth, shape (H, W), bool.
 
-    Args:
-        path: A PNG file of values 0, 1, 2 and 3.
-        width_px: Width of the distorted image.
-        height_px: Its height.
-
     Raises:
-        WorkspaceError: If the file is no image, or of another size.
+        WorkspaceError: If the file is no image, or of another size than that.
     """
     size = image_size(path)
     if size != (width_px, height_px):
@@ -211,13 +197,10 @@ class DistortedView:
         return int(self.camera.width), int(self.camera.height)
 
     def rays(self, xy: Matrix) -> Matrix:
-        """Rays through places of the image, in the camera frame, with z = 1.
+        """Rays in the camera frame, with z = 1, shape (N, 3), float64.
 
-        Args:
-            xy: COLMAP's coordinates, in pixels, shape (N, 2), float64.
-
-        Returns:
-            Shape (N, 3), float64; NaN where the distortion cannot be undone.
+        NaN where the distortion cannot be undone. `xy` are COLMAP's coordinates, in
+        pixels, shape (N, 2), float64.
         """
         on_plane = self.camera.cam_from_img(xy)
         return np.column_stack([on_plane, np.ones(len(on_plane))])
@@ -225,9 +208,6 @@ class DistortedView:
 
 def read_distorted_views(path: Path) -> dict[str, DistortedView]:
     """Read the views of a model by the last part of their names.
-
-    Args:
-        path: Folder of the model.
 
     Raises:
         WorkspaceError: If the model is missing, broken, or two images share a name.

@@ -1,4 +1,7 @@
-"""Maps in formats of other programs: NPY, PFM, 16-bit PNG."""
+"""Maps in formats of other programs: NPY, PFM, 16-bit PNG.
+
+WorkspaceError if a file cannot be written.
+"""
 
 import io
 import re
@@ -15,22 +18,14 @@ MAX_PNG_VALUE = 65535
 
 
 def write_npy(path: Path, depth: DepthMap) -> None:
-    """Write a depth map as float32, shape (H, W), for `numpy.load`.
-
-    Raises:
-        WorkspaceError: If the file cannot be written.
-    """
+    """Write a depth map as float32, shape (H, W), for `numpy.load`."""
     buffer = io.BytesIO()
     np.save(buffer, depth.astype("<f4"))
     write_whole(path, buffer.getvalue())
 
 
 def write_pfm(path: Path, depth: DepthMap) -> None:
-    """Write a depth map as PFM: grey, little-endian float32, bottom row first.
-
-    Raises:
-        WorkspaceError: If the file cannot be written.
-    """
+    """Write a depth map as PFM: grey, little-endian float32, bottom row first."""
     height, width = depth.shape
     header = f"Pf\n{width} {height}\n-1.0\n".encode("ascii")  # -: little-endian
     write_whole(path, header + np.flipud(depth).astype("<f4").tobytes())
@@ -46,9 +41,6 @@ def write_png16(path: Path, depth: DepthMap, unit: float) -> None:
         path: The file to write.
         depth: Shape (H, W), in workspace units; 0 = no depth.
         unit: Depth of one step of the value, in workspace units.
-
-    Raises:
-        WorkspaceError: If the file cannot be written.
     """
     scaled = np.clip(np.rint(depth.astype(np.float64) / unit), 1, MAX_PNG_VALUE)
     values = np.where(depth > 0, scaled, 0).astype(np.uint16)
@@ -61,10 +53,7 @@ _LONGEST_HEADER = 100
 
 
 def read_pfm(path: Path) -> FloatMap:
-    """Read a grey PFM file.
-
-    Returns:
-        Shape (H, W), float32, the top row first; infinite values are left as they are.
+    """Read a grey PFM file, shape (H, W), float32, the top row first.
 
     Raises:
         WorkspaceError: If the file is not there, no grey PFM, or truncated.

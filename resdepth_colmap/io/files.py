@@ -17,14 +17,8 @@ _DRIVE = re.compile(r"[A-Za-z]:")
 def write_whole(path: Path, data: bytes) -> None:
     """Write a file whole or not at all; its folder is made.
 
-    A target that is a link is replaced, never written through.
-
-    Args:
-        path: The file to write; an older one is replaced.
-        data: Its content.
-
-    Raises:
-        WorkspaceError: If the file cannot be written (no permission, disk full).
+    An older file is replaced, a link never written through. WorkspaceError if the file
+    cannot be written (no permission, disk full).
     """
     with whole_file(path) as partial:
         partial.write_bytes(data)
@@ -36,12 +30,7 @@ def whole_file(path: Path) -> Iterator[Path]:
 
     The temporary file lies in the same folder and has the same extension, for writers
     that choose the format by it. After an error in the block nothing is left behind.
-
-    Args:
-        path: The file to write in the end; its folder is made.
-
-    Yields:
-        Path to write to.
+    The folder of `path` is made.
 
     Raises:
         WorkspaceError: If the file cannot be written (no permission, disk full).
@@ -55,7 +44,11 @@ def whole_file(path: Path) -> Iterator[Path]:
     except WorkspaceError:
         raise
     except OSError as error:
-        raise _cannot_write(path, error) from error
+        reason = error.strerror or str(error)
+        raise WorkspaceError(
+            f"{path}: cannot write ({reason}); "
+            "check the permissions of its folder and the free space of the disk."
+        ) from error
     finally:
         with contextlib.suppress(OSError):
             partial.unlink()
@@ -104,13 +97,10 @@ def link_or_copy(source: Path, target: Path) -> None:
 
 
 def safe_name(name: str) -> str:
-    """Check a name from a file we do not control: it has to stay in its folder.
+    """The same name, from a file we do not control, if it stays in its folder.
 
     Args:
         name: Relative path with "/" between folders, as in a COLMAP model.
-
-    Returns:
-        The same name.
 
     Raises:
         WorkspaceError: For a name that is empty, absolute, leads out of the folder
@@ -155,11 +145,3 @@ def _flush_to_disk(path: Path) -> None:
         return
     with path.open("r+b") as file:
         os.fsync(file.fileno())
-
-
-def _cannot_write(path: Path, error: OSError) -> WorkspaceError:
-    reason = error.strerror or str(error)
-    return WorkspaceError(
-        f"{path}: cannot write ({reason}); "
-        "check the permissions of its folder and the free space of the disk."
-    )

@@ -24,60 +24,33 @@ _LUMA = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
 
 
 def read_gray(path: Path) -> GrayImage:
-    """Read a photo as grey values.
+    """Read a photo as grey values in 0..1, shape (H, W), float32; alpha is dropped.
 
-    Args:
-        path: Image file, 8 or 16 bits a channel, grey or colour; alpha is dropped.
-
-    Returns:
-        Grey values in 0..1, shape (H, W), float32.
-
-    Raises:
-        WorkspaceError: If the file is not there or no image.
+    8 or 16 bits a channel, grey or colour. WorkspaceError if it is no image.
     """
     values = _read_unit(path)
     return values if values.ndim == 2 else values @ _LUMA
 
 
 def read_unit_colors(path: Path) -> UnitColors:
-    """Read a photo as RGB values in 0..1, shape (H, W, 3), float32; alpha is dropped.
-
-    Raises:
-        WorkspaceError: If the file is not there or no image.
-    """
+    """Read a photo as RGB in 0..1, shape (H, W, 3), float32; see `read_gray`."""
     values = _read_unit(path)
     return values if values.ndim == 3 else np.repeat(values[..., np.newaxis], 3, 2)
 
 
 def read_rgb(path: Path) -> ColorImage:
-    """Read a photo as RGB values, shape (H, W, 3), uint8; alpha is dropped.
-
-    Raises:
-        WorkspaceError: If the file is not there or no image.
-    """
+    """Read a photo as RGB values, shape (H, W, 3), uint8; see `read_gray`."""
     return (read_unit_colors(path) * 255 + 0.5).astype(np.uint8)
 
 
 def image_size(path: Path) -> tuple[int, int]:
-    """Width and height of an image, in pixels, without decoding it.
-
-    Raises:
-        WorkspaceError: If the file is not there or no image.
-    """
+    """Width and height of an image, in pixels; WorkspaceError if it is no image."""
     with _open(path) as image:
         return image.size
 
 
 def write_png(path: Path, rgb: ColorImage) -> None:
-    """Write a picture as PNG, whole or not at all; its folder is made.
-
-    Args:
-        path: The file to write.
-        rgb: RGB values, shape (H, W, 3), uint8.
-
-    Raises:
-        WorkspaceError: If the file cannot be written.
-    """
+    """Write RGB values, shape (H, W, 3), uint8, as PNG; WorkspaceError if it fails."""
     if rgb.ndim != 3 or rgb.shape[2] != 3 or rgb.dtype != np.uint8:
         raise ValueError(f"{rgb.shape=}, {rgb.dtype=} but expected (H, W, 3), uint8.")
     write_whole(path, encode_png(rgb))

@@ -42,15 +42,10 @@ class _Element:
 
 
 def read_ply_points(path: Path) -> npt.NDArray[np.float32]:
-    """Read the coordinates x, y and z of the vertices.
+    """Read the coordinates of the vertices of a cloud or mesh, shape (N, 3), N >= 0.
 
-    Args:
-        path: A .ply, text or binary of either byte order, with coordinates of any type
-            and whatever else; also a mesh.
-
-    Returns:
-        Coordinates in the units of the file, shape (N, 3); rounded to float32, as all
-        programs that read scans do. NaN and infinity are as in the file; N may be 0.
+    Text or binary of either byte order, coordinates of any type. They are rounded to
+    float32, as all programs that read scans do; NaN and infinity are as in the file.
 
     Raises:
         WorkspaceError: If the file is not there, is no PLY, or holds less than its

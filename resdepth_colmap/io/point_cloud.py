@@ -70,11 +70,7 @@ class PointCloud:
 
 
 def check_cloud_path(path: Path) -> None:
-    """Check that a cloud can be written in the format of a path's extension.
-
-    Raises:
-        ConfigError: If the extension is none of CLOUD_SUFFIXES.
-    """
+    """ConfigError if a path's extension is none of CLOUD_SUFFIXES."""
     if path.suffix.lower() not in CLOUD_SUFFIXES:
         known = ", ".join(CLOUD_SUFFIXES)
         raise ConfigError(
@@ -85,10 +81,7 @@ def check_cloud_path(path: Path) -> None:
 def write_cloud(path: Path, cloud: PointCloud) -> None:
     """Write a cloud, whole or not at all, in the format of the path's extension.
 
-    Args:
-        path: A .ply or .pcd (binary: coordinates, colours, normals) or .xyz (text,
-            coordinates alone).
-        cloud: The points; at least one.
+    .ply and .pcd are binary and hold coordinates, colours and normals.
 
     Raises:
         ConfigError: If the extension is none of these.
@@ -104,13 +97,18 @@ def write_cloud(path: Path, cloud: PointCloud) -> None:
         )
     open3d = load_open3d()
 
-    tensor_cloud = open3d.t.geometry.PointCloud(
-        _tensor(cloud.points, cloud.points.dtype)
+    points, colors, normals = (
+        open3d.core.Tensor.from_numpy(np.ascontiguousarray(values, dtype))
+        for values, dtype in (
+            (cloud.points, cloud.points.dtype),
+            (cloud.colors, np.uint8),
+            (cloud.normals, np.float32),
+        )
     )
-    tensor_cloud.point.colors = _tensor(cloud.colors, np.uint8)
-    tensor_cloud.point.normals = _tensor(cloud.normals, np.float32)
+    tensor_cloud = open3d.t.geometry.PointCloud(points)
+    tensor_cloud.point.colors, tensor_cloud.point.normals = colors, normals
     with whole_file(path) as partial:
-        with _quiet_open3d():
+        with _quiet(open3d):
             is_written = open3d.t.io.write_point_cloud(partial, tensor_cloud)
         if not is_written:
             raise WorkspaceError(
@@ -120,13 +118,7 @@ def write_cloud(path: Path, cloud: PointCloud) -> None:
 
 
 def read_cloud(path: Path) -> PointCloud:
-    """Read a PLY file.
-
-    Args:
-        path: A .ply, text or binary, float or double.
-
-    Returns:
-        Its points; colours and normals are 0 where the file has none.
+    """Read a PLY file; colours and normals are 0 where it has none.
 
     Raises:
         ConfigError: If it is no .ply.
@@ -138,7 +130,7 @@ def read_cloud(path: Path) -> PointCloud:
         raise WorkspaceError(f"{path}: no such file.")
     open3d = load_open3d()
 
-    with _quiet_open3d():
+    with _quiet(open3d):
         tensor_cloud = open3d.t.io.read_point_cloud(path)
     values = {key: value.numpy() for key, value in tensor_cloud.point.items()}
     if len(values.get("positions", ())) == 0:
@@ -158,14 +150,6 @@ def _compact(points: npt.NDArray[np.floating[Any]]) -> npt.NDArray[np.floating[A
     return points.astype(np.float64 if step > 1e-5 * size > 0 else np.float32)
 
 
-def _tensor(values: npt.NDArray[Any], dtype: npt.DTypeLike) -> Any:
-    open3d = load_open3d()
-
-    return open3d.core.Tensor.from_numpy(np.ascontiguousarray(values, dtype=dtype))
-
-
-def _quiet_open3d() -> Any:
-    """open3d's warnings off the terminal: what matters is raised."""
-    open3d = load_open3d()
-
+def _quiet(open3d: Any) -> Any:
+    """Warnings off the terminal: what matters is raised."""
     return open3d.utility.VerbosityContextManager(open3d.utility.VerbosityLevel.Error)

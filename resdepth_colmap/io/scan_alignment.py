@@ -35,14 +35,9 @@ class AlignedScan:
 
 
 def read_scan_alignment(path: Path) -> tuple[AlignedScan, ...]:
-    """Read where the scans of a scene stand; the scans themselves are not read.
+    """Read where the scans of a scene stand, at least one; they are not read.
 
-    Args:
-        path: A MeshLab project. Of several groups of meshes the first counts, as for
-            ETH3D's own program.
-
-    Returns:
-        The scans in the order of the file, at least one.
+    Of several groups of meshes the first counts, as for ETH3D's own program.
 
     Raises:
         WorkspaceError: If the file is not there or not such a project, if a scan has
@@ -83,9 +78,8 @@ def _matrix(text: str, label: str) -> npt.NDArray[np.float32]:
     try:
         values = np.array([float(word) for word in text.split()], np.float32)
     except ValueError as error:
-        raise WorkspaceError(f"{label}: its matrix is not of numbers: {error}.") from (
-            error
-        )
+        message = f"{label}: its matrix is not of numbers: {error}."
+        raise WorkspaceError(message) from error
     if values.shape != (16,) or not np.isfinite(values).all():
         raise WorkspaceError(
             f"{label}: its matrix has {values.size} values but expected 16 numbers."

@@ -46,25 +46,20 @@ def read_sources(path: Path) -> dict[str, SourceSpec]:
     Raises:
         WorkspaceError: If the file is not there or malformed; the line is named.
     """
-    lines = list(_lines(path))
-    if len(lines) % 2:
-        number, name = lines[-1]
-        raise WorkspaceError(
-            f"{path}, line {number}: no line of sources after {name!r}."
-        )
-    pairs = zip(lines[0::2], lines[1::2], strict=True)
     sources: dict[str, SourceSpec] = {}
-    for (_, name), (number, text) in pairs:
-        sources.setdefault(name, _parse(path, number, text))
+    lines = _lines(path)
+    for number, name in lines:
+        follows = next(lines, None)
+        if follows is None:
+            raise WorkspaceError(
+                f"{path}, line {number}: no line of sources after {name!r}."
+            )
+        sources.setdefault(name, _parse(path, *follows))
     return sources
 
 
 def write_patch_match_cfg(path: Path, sources: Mapping[str, SourceSpec]) -> None:
-    """Write a `patch-match.cfg`, whole or not at all.
-
-    Raises:
-        WorkspaceError: If the file cannot be written, or a name cannot stand in it.
-    """
+    """Write a `patch-match.cfg`; WorkspaceError if it, or a name, cannot be written."""
     lines: list[str] = []
     for name, spec in sources.items():
         for source in spec.names:
@@ -74,21 +69,8 @@ def write_patch_match_cfg(path: Path, sources: Mapping[str, SourceSpec]) -> None
     _write_lines(path, lines)
 
 
-def read_fusion_cfg(path: Path) -> tuple[str, ...]:
-    """Read a `fusion.cfg`: the names of the images to fuse, one a line.
-
-    Raises:
-        WorkspaceError: If the file is not there or no text.
-    """
-    return tuple(name for _, name in _lines(path))
-
-
 def write_fusion_cfg(path: Path, names: Sequence[str]) -> None:
-    """Write a `fusion.cfg`, whole or not at all.
-
-    Raises:
-        WorkspaceError: If the file cannot be written, or a name cannot stand in it.
-    """
+    """Write a `fusion.cfg`; WorkspaceError if it, or a name, cannot be written."""
     _write_lines(path, list(names))
 
 

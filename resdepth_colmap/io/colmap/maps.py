@@ -26,11 +26,9 @@ _NUM_LEADING = 3  # column, row, number of sources
 
 
 def read_depth_map(path: Path) -> DepthMap:
-    """Read one depth map.
+    """Read one depth map, shape (H, W), float32, in workspace units; 0 = no depth.
 
-    Returns:
-        Depth, shape (H, W), float32, in workspace units; 0 = no depth. What is not
-        finite or negative in the file has become 0.
+    What is not finite or negative in the file has become 0.
 
     Raises:
         WorkspaceError: If the file is not there, truncated, has a lying header or
@@ -43,15 +41,10 @@ def read_depth_map(path: Path) -> DepthMap:
 
 
 def write_depth_map(path: Path, depth: DepthMap) -> None:
-    """Write one depth map, whole or not at all; its folder is made.
+    """Write one depth map, shape (H, W), whole or not at all; its folder is made.
 
-    Args:
-        path: The file to write.
-        depth: Depth, shape (H, W), float32; 0 = no depth. NaN, infinite and negative
-            depths are written as 0: COLMAP's fusion would let them through.
-
-    Raises:
-        WorkspaceError: If the file cannot be written.
+    NaN, infinite and negative depths are written as 0: COLMAP's fusion would let them
+    through. WorkspaceError if the file cannot be written.
     """
     if depth.ndim != 2:
         raise ValueError(f"{depth.shape=} but expected (H, W).")
@@ -60,11 +53,9 @@ def write_depth_map(path: Path, depth: DepthMap) -> None:
 
 
 def read_normal_map(path: Path) -> NormalMap:
-    """Read one normal map.
+    """Read one normal map, shape (H, W, 3), float32, in the camera frame.
 
-    Returns:
-        Normals in the camera frame, shape (H, W, 3), float32; (0, 0, 0) = none, also
-        where a component in the file is not finite.
+    (0, 0, 0) = none, also where a component in the file is not finite.
 
     Raises:
         WorkspaceError: If the file is not there, truncated, has a lying header or
@@ -79,14 +70,9 @@ def read_normal_map(path: Path) -> NormalMap:
 def write_normal_map(path: Path, normals: NormalMap) -> None:
     """Write one normal map, whole or not at all; its folder is made.
 
-    Args:
-        path: The file to write.
-        normals: Unit normals in the camera frame, shape (H, W, 3), float32, towards
-            the camera (nz < 0); (0, 0, 0) = none, which is also written for a normal
-            that is not finite.
-
-    Raises:
-        WorkspaceError: If the file cannot be written.
+    Unit normals in the camera frame, shape (H, W, 3), towards the camera (nz < 0);
+    (0, 0, 0) = none, which is also written for a normal that is not finite.
+    WorkspaceError if the file cannot be written.
     """
     if normals.ndim != 3 or normals.shape[2] != 3:
         raise ValueError(f"{normals.shape=} but expected (H, W, 3).")
@@ -105,9 +91,6 @@ def write_consistency_graph(
         agrees: Whether source s agrees with a pixel, shape (S, H, W).
         image_indices: Index of each source among the images of the model, as COLMAP
             counts them, shape (S,).
-
-    Raises:
-        WorkspaceError: If the file cannot be written.
     """
     num_sources, height, width = agrees.shape
     by_pixel = agrees.reshape(num_sources, height * width)
@@ -128,11 +111,7 @@ def write_consistency_graph(
 
 
 def read_map_size(path: Path) -> tuple[int, int]:
-    """Width and height of a depth or normal map, in pixels, from its header alone.
-
-    Raises:
-        WorkspaceError: If the file is not there or has no header.
-    """
+    """Width and height of a map, in pixels; WorkspaceError if it has no header."""
     with reading(path), path.open("rb") as file:
         (width, height, _), _ = _parsed(path, file.read(_LONGEST_HEADER))
     return width, height

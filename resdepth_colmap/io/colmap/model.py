@@ -234,8 +234,7 @@ class SparsePoints:
     Attributes:
         ids: COLMAP's ids, ascending, shape (N,).
         xyz: World coordinates, shape (N, 3), in units.
-        seen: Of each image id the places, in `ids`, of the points in whose tracks the
-            image is; an image without points is missing.
+        seen: By image id, the indices in `ids` of the points that the image saw.
     """
 
     ids: npt.NDArray[np.int64]
@@ -247,25 +246,21 @@ class SparsePoints:
         return dataclasses.replace(self, xyz=self.xyz - origin_in_world)
 
     def seen_by(self, image_id: int) -> npt.NDArray[np.int64]:
-        """Places of the points that an image saw, shape (M,)."""
+        """Indices of the points that an image saw, shape (M,)."""
         return self.seen.get(image_id, np.zeros(0, np.int64))
 
 
 def read_sparse_points(sparse_path: Path) -> SparsePoints:
-    """Read the points of a model; there may be none.
-
-    Raises:
-        WorkspaceError: If the model is missing or broken.
-    """
+    """Read the points, maybe none; WorkspaceError if the model is missing or broken."""
     points = open_reconstruction(sparse_path).points3D
     ids = sorted(points)
     seen: defaultdict[int, set[int]] = defaultdict(set)
     xyz = np.zeros((len(ids), 3))
-    for place, point_id in enumerate(ids):
+    for index, point_id in enumerate(ids):
         point = points[point_id]
-        xyz[place] = point.xyz
+        xyz[index] = point.xyz
         for element in point.track.elements:
-            seen[int(element.image_id)].add(place)
+            seen[int(element.image_id)].add(index)
     return SparsePoints(
         ids=np.array(ids, np.int64),
         xyz=xyz,

@@ -99,11 +99,8 @@ class OutputWorkspace:
     def prepare(self, names: Sequence[str]) -> None:
         """Make the folders, and link images and model; doing it again is fine.
 
-        Args:
-            names: The images of the model. Those without a file are left out.
-
-        Raises:
-            WorkspaceError: If a folder or link cannot be made.
+        Images without a file are left out. WorkspaceError if a folder or link cannot be
+        made.
         """
         for folder in ("depth_maps", "normal_maps", "confidence_maps"):
             _make_folder(self.workspace.stereo_path / folder)
@@ -124,9 +121,6 @@ class OutputWorkspace:
         Args:
             names: The images that have a refined map, in the order of the fusion.
             sources: The sources of each; None: COLMAP's automatic choice.
-
-        Raises:
-            WorkspaceError: If a file cannot be written.
         """
         automatic = SourceSpec(kind=SourceKind.AUTO, num_auto=20)
         sources = sources or dict.fromkeys(names, automatic)
@@ -176,11 +170,7 @@ class OutputWorkspace:
 
 
 def read_record(path: Path) -> dict[str, Any]:
-    """Read a run record (`run.json`); {} if there is none.
-
-    Raises:
-        WorkspaceError: If the file is no JSON object.
-    """
+    """Read a run record (`run.json`), {} if none; WorkspaceError if it is no object."""
     try:
         with reading(path):
             if not path.exists():
@@ -194,11 +184,7 @@ def read_record(path: Path) -> dict[str, Any]:
 
 
 def write_record(path: Path, mapping: Mapping[str, Any]) -> None:
-    """Write a run record, whole or not at all; paths and enums become strings.
-
-    Raises:
-        WorkspaceError: If the file cannot be written.
-    """
+    """Write a run record, whole or not at all; paths and enums become strings."""
     text = json.dumps(dict(mapping), indent=2, ensure_ascii=False, default=str)
     write_whole(path, (text + "\n").encode("utf-8"))
 

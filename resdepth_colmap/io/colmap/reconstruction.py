@@ -20,10 +20,7 @@ PYCOLMAP_ERRORS = (ValueError, IndexError, KeyError, RuntimeError, OSError)
 
 
 def open_reconstruction(path: Path) -> Any:
-    """Read a model: a pycolmap.Reconstruction.
-
-    Args:
-        path: Its folder, binary or text, of any COLMAP version.
+    """Read a pycolmap.Reconstruction, binary or text, of any COLMAP version.
 
     Raises:
         WorkspaceError: If the model is missing or broken.
@@ -72,11 +69,7 @@ def find_model(folder: Path) -> str | None:
 
 
 def check_model_files(folder: Path) -> None:
-    """Check that the files of a model are all there, and whole if they are binary.
-
-    Raises:
-        WorkspaceError: If the folder holds no model, or a file is missing or truncated.
-    """
+    """WorkspaceError if there is no model, or a file of it is missing or truncated."""
     suffix = find_model(folder)
     if suffix is None:
         raise WorkspaceError(
@@ -94,13 +87,10 @@ def check_model_files(folder: Path) -> None:
 
 
 def names_in_text(folder: Path) -> dict[int, str]:
-    """The whole image names of a text model, by image id.
+    """The image names of a text model, by image id; WorkspaceError if it is no UTF-8.
 
     COLMAP writes names with blanks into `images.txt`, but reads them only up to the
     first one.
-
-    Raises:
-        WorkspaceError: If the file is no text in UTF-8.
     """
     path = folder / "images.txt"
     lines = iter(read_text(path).split("\n"))
@@ -122,10 +112,13 @@ def _walk(path: Path, step: Callable[[bytes, int], int]) -> None:
             offset = step(data, offset)
             if offset > len(data):
                 break
+        if offset > len(data):
+            raise ValueError("the last record has no end")
     except (OSError, struct.error, ValueError, IndexError) as error:
-        raise _broken(path) from error
-    if offset > len(data):
-        raise _broken(path)
+        raise WorkspaceError(
+            f"{path}: truncated or no COLMAP model file; copy it or export the model "
+            "again."
+        ) from error
 
 
 def _after_camera(data: bytes, offset: int) -> int:
@@ -145,9 +138,3 @@ def _after_point(data: bytes, offset: int) -> int:
 
 
 _STEPS = {"cameras": _after_camera, "images": _after_image, "points3D": _after_point}
-
-
-def _broken(path: Path) -> WorkspaceError:
-    return WorkspaceError(
-        f"{path}: truncated or no COLMAP model file; copy it or export the model again."
-    )
