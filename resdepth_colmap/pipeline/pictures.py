@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.geometry.resize import nearest_resized
 from resdepth_colmap.io.colmap.maps import read_depth_map
 from resdepth_colmap.io.colmap.output import OutputWorkspace
@@ -13,7 +14,7 @@ from resdepth_colmap.io.images import read_rgb, write_png
 from resdepth_colmap.pipeline.initial_map import map_path
 from resdepth_colmap.pipeline.refine.stage import RefineReport
 from resdepth_colmap.progress import Progress
-from resdepth_colmap.scene import Scene
+from resdepth_colmap.scene import FloatMap, Scene
 from resdepth_colmap.viz.strips import BeforeAfter, depth_strip, overview, thumbnails
 
 FOLDER = "pictures"
@@ -42,7 +43,8 @@ def draw_workspace(
             path = output.path / FOLDER / f"{safe_name(name)}.png"
             is_due = name in report.refined or not path.exists()
             if is_due or name in shown:
-                content = _load(output, report, name)
+                kind = report.images[name]["input"]
+                content = read_before_after(output, name, kind)
                 if is_due:
                     write_png(path, depth_strip(content))
                 if name in shown:
@@ -61,16 +63,33 @@ def evenly_chosen(names: Sequence[str], most: int) -> list[str]:
     return [names[place] for place in places]
 
 
-def _load(output: OutputWorkspace, report: RefineReport, name: str) -> BeforeAfter:
-    source = output.source
-    before = read_depth_map(map_path(source, name, report.images[name]["input"]))
+def read_before_after(output: OutputWorkspace, name: str, kind: str) -> BeforeAfter:
+    """Read photo, initial and refined depth, and ground truth of the maps' size.
+
+    Args:
+        output: Has the refined map; its source the photo and the initial map.
+        name: Image name.
+        kind: The kind of the initial map.
+
+    Raises:
+        WorkspaceError: If a file is missing or broken, or the maps differ in size.
+    """
+    source, after_path = output.source, output.depth_map_path(name)
+    after = read_depth_map(after_path)
+    before = read_depth_map(map_path(source, name, kind))
+    check_equal_size(after_path, after, "the initial map", before)
     path, truth = source.truth_path(name), None
     if path.is_file():
-        truth = nearest_resized(read_depth_map(path), before.shape[::-1])
-    return BeforeAfter(
-        name=name,
-        rgb=read_rgb(source.image_path(name)),
-        before=before,
-        after=read_depth_map(output.depth_map_path(name)),
-        truth=truth,
-    )
+        truth = nearest_resized(read_depth_map(path), after.shape[::-1])
+    rgb = read_rgb(source.image_path(name))
+    return BeforeAfter(name=name, rgb=rgb, before=before, after=after, truth=truth)
+
+
+def check_equal_size(path: Path, values: FloatMap, of: str, other: FloatMap) -> None:
+    """WorkspaceError, naming the file, if a map differs in size from another one."""
+    if values.shape != other.shape:
+        sizes = [f"{it.shape[1]} x {it.shape[0]}" for it in (values, other)]
+        raise WorkspaceError(
+            f"{path}: {sizes[0]} px, but {of} has {sizes[1]}; refine it again with "
+            "--overwrite."
+        )

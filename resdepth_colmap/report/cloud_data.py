@@ -1,5 +1,6 @@
 """The fused clouds and the cameras, reduced to the size of a page."""
 
+import itertools
 import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple, Self
@@ -80,11 +81,7 @@ class PackedCloud(NamedTuple):
 
 
 def packed_cloud(cloud: PointCloud, box: CloudBox, most: int) -> PackedCloud | None:
-    """At most `most` points of a cloud, in the order of a Z-order curve.
-
-    Returns:
-        The points inside of the box; None without any.
-    """
+    """At most `most` points in the box, along a Z-order curve; None without any."""
     sample = cloud.sampled(most)
     unit = box.shown(sample.points) / SIZE + 0.5
     inside = ((unit >= 0) & (unit <= 1)).all(axis=1)
@@ -113,11 +110,6 @@ def first_look(
     views: Sequence[View], points: Positions, box: CloudBox
 ) -> dict[str, Any]:
     """The first view of the cloud: from near the cameras, with most points in sight.
-
-    Args:
-        views: The cameras; at least one.
-        points: The cloud in the world frame, shape (N, 3).
-        box: The part of space that is shown.
 
     Returns:
         "eye", "target" and "up" in page units, the vertical field of view "fov_deg" and
@@ -175,11 +167,9 @@ def _rounded(xyz: Matrix) -> list[float]:
 
 def _morton(values: npt.NDArray[np.uint16]) -> npt.NDArray[np.uint64]:
     """Index of each point on the Z-order curve, from the top 10 bits of x, y and z."""
+    coordinates = (values >> 6).astype(np.uint64)
     code = np.zeros(len(values), np.uint64)
-    for axis in range(3):
-        coordinate = (values[:, axis] >> 6).astype(np.uint64)
-        for bit in range(10):
-            code |= ((coordinate >> np.uint64(bit)) & np.uint64(1)) << np.uint64(
-                3 * bit + axis
-            )
+    for bit, axis in itertools.product(range(10), range(3)):
+        digit = (coordinates[:, axis] >> np.uint64(bit)) & np.uint64(1)
+        code |= digit << np.uint64(3 * bit + axis)
     return code

@@ -9,9 +9,7 @@ import numpy as np
 
 from resdepth_colmap.report.image_maps import ImageMaps
 from resdepth_colmap.viz.colormaps import (
-    DepthScale,
     difference_limit,
-    relative_difference,
 )
 
 MAX_NUM_NAMES = 100
@@ -24,8 +22,7 @@ Record = Mapping[str, Any]
 
 def image_facts(maps: ImageMaps, record: Record) -> dict[str, Any]:
     """The facts of one image, computed from the full maps."""
-    scale = DepthScale.of(maps.after, maps.before)
-    change = relative_difference(maps.before, maps.after)
+    scale, change = maps.scale, maps.difference
     size = np.abs(change[np.isfinite(change)])
     errors = maps.errors
     height_px, width_px = maps.before.shape
@@ -47,15 +44,12 @@ def image_facts(maps: ImageMaps, record: Record) -> dict[str, Any]:
 def summary_facts(
     record: Record, images: Sequence[Record], num_pixels: int
 ) -> dict[str, Any]:
-    """The facts of the workspace.
+    """The facts of the workspace; pairs are before and after, None = unknown.
 
     Args:
         record: The run record.
         images: The facts of each image.
         num_pixels: Number of pixels of all refined maps.
-
-    Returns:
-        Plain values; pairs are before and after, None = unknown.
     """
     records = [r for r in _mapping(record, "images").values() if isinstance(r, Mapping)]
     fuse, fuse_before = _mapping(record, "fuse"), _mapping(record, "fuse_before")

@@ -1,7 +1,6 @@
 """The stage "report": a page from maps, cloud and run record of a workspace."""
 
 import logging
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +23,7 @@ from resdepth_colmap.report.content import (
     image_content,
 )
 from resdepth_colmap.report.facts import (
+    Record,
     image_facts,
     left_out_facts,
     rounded,
@@ -61,9 +61,8 @@ def write_report(path: Path, progress: Progress | None = None) -> Path:
     in_place = isinstance(options, dict) and options.get("in_place") is True
     output = OutputWorkspace(source=workspace, in_place=in_place)
     report = _Report(output, scene, record, progress or SilentProgress())
-    text = report.rendered()
     target = output.path / REPORT_NAME
-    write_whole(target, text.encode("utf-8"))
+    write_whole(target, report.rendered().encode("utf-8"))
     return target
 
 
@@ -71,16 +70,10 @@ class _Report:
     """A report: its images, and the images that were left out."""
 
     def __init__(
-        self,
-        output: OutputWorkspace,
-        scene: Scene,
-        record: Mapping[str, Any],
-        progress: Progress,
+        self, output: OutputWorkspace, scene: Scene, record: Record, progress: Progress
     ) -> None:
-        self.output = output
-        self.scene = scene
-        self.record = record
-        self.progress = progress
+        self.output, self.scene = output, scene
+        self.record, self.progress = record, progress
         self.images = _refined_images(output, scene, record)
         self.left_out: dict[str, str] = {}
 
@@ -163,16 +156,13 @@ class _Report:
             return None
 
     def _cloud(self, budget: Budget) -> Content | None:
-        path = cloud_path(self.output, "ply")
-        before_path = cloud_before_path(self.output)
-        if not path.is_file():
+        paths = (cloud_path(self.output, "ply"), cloud_before_path(self.output))
+        if not paths[0].is_file():
             return None
         offset = -self.scene.origin_in_world
-        before = None
-        if before_path.is_file():
-            before = read_cloud(before_path).moved(offset)
+        after, *before = (read_cloud(it).moved(offset) for it in paths if it.is_file())
         views = [view for view in self.scene.views if view.name in self.images]
-        return cloud_content(read_cloud(path).moved(offset), before, views, budget)
+        return cloud_content(after, before[0] if before else None, views, budget)
 
 
 _NUM_TRIED = 4
@@ -181,8 +171,8 @@ _SPACE_FOR_FACTS = {"facts": " " * 1200}  # of one image, in the JSON of the pag
 
 
 def _refined_images(
-    output: OutputWorkspace, scene: Scene, record: Mapping[str, Any]
-) -> dict[str, Mapping[str, Any]]:
+    output: OutputWorkspace, scene: Scene, record: Record
+) -> dict[str, Record]:
     """The record of each refined image, in the order of the model."""
     way_out = f"run `resdepth-colmap refine {output.source.path}` first"
     if not record:

@@ -80,10 +80,6 @@ class Eth3dOptions:
 def eth3d_sources(root: Path, options: Eth3dOptions) -> tuple[SceneSource, ...]:
     """The scenes to read; reading a scene that is not in the root fails.
 
-    Args:
-        root: The folder with the unpacked archives of ETH3D.
-        options: Scenes, pairs and size.
-
     Raises:
         WorkspaceError: If there is no scene, or the file of pairs is malformed.
     """
@@ -126,23 +122,16 @@ class _SceneReader:
         }
 
     def pairs_by_rule(self, num_pairs: int | None) -> tuple[Pair, ...]:
-        """Pairs whose reference has ground truth.
-
-        Raises:
-            WorkspaceError: If there are none.
-        """
+        """Pairs whose reference has ground truth; WorkspaceError if there are none."""
         paper = PAPER_ROWS.get(self.files.name)
         num_pairs = num_pairs or (paper.num_pairs if paper else NUM_PAIRS)
-        references = [
-            index
-            for name, index in self.indices.items()
-            if self.files.truth_path(name).is_file()
-        ]
+        truth_path, indices = self.files.truth_path, self.indices
+        references = [indices[name] for name in indices if truth_path(name).is_file()]
         pairs = choose_pairs(self.scene, references, num_pairs)
         if not pairs:
             raise WorkspaceError(
                 f"{self.files.path}: no pair of high overlap among the "
-                f"{len(references)} of {len(self.indices)} images with ground truth; "
+                f"{len(references)} of {len(indices)} images with ground truth; "
                 f"list pairs in {PAIRS_NAME}."
             )
         return pairs
@@ -154,9 +143,8 @@ class _SceneReader:
         near, far = wanted.stereo.depth_min, wanted.stereo.depth_max
         if near <= 0:
             near, far = depth_range(self.scene, pair.reference, [pair.source])
-        truth = undistorted_truth(
-            self.files, self._distorted(reference), reference, camera
-        )
+        distorted = self._distorted(reference)
+        truth = undistorted_truth(self.files, distorted, reference, camera)
         if not truth.any():
             raise WorkspaceError(
                 f"{self.files.truth_path(_file_name(reference))}: none of its depths "

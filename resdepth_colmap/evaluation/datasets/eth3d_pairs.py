@@ -49,23 +49,17 @@ def choose_pairs(
 
     Each reference is paired with the best of its sources (`choose_sources`) that see
     60 % of it at a triangulation angle of 2 to 15 degrees. The pairs with the most
-    shared points are taken, those with a view of an earlier pair last.
-
-    Args:
-        scene: The views and their statistics.
-        references: Indices of the views with ground truth.
-        num_pairs: Largest number of pairs.
-
-    Returns:
-        The pairs, sorted by reference; fewer if fewer qualify.
+    shared points are taken, those with a view of an earlier pair last; at most
+    `num_pairs`, sorted by reference.
     """
-    found = []
+    found: list[tuple[int, Pair]] = []
     for reference in sorted(references):
-        choices = choose_sources(scene, reference, _NUM_CANDIDATES)
-        good = [it for it in choices if _is_good(scene, reference, it)]
-        if good:
-            found.append((good[0].num_shared_points, reference, good[0].index))
-    ranked = [Pair(r, s) for _, r, s in sorted(found, key=lambda it: (-it[0], it[1]))]
+        for choice in choose_sources(scene, reference, _NUM_CANDIDATES):
+            if _is_good(scene, reference, choice):
+                pair = Pair(reference, choice.index)
+                found.append((-choice.num_shared_points, pair))
+                break
+    ranked = [pair for _, pair in sorted(found)]
     taken: list[Pair] = []
     for pair in ranked:
         if not any(set(pair) & set(other) for other in taken):
@@ -101,12 +95,7 @@ def read_pairs(path: Path) -> dict[str, list[tuple[str, str]]]:
 def named_pairs(
     path: Path, names: list[tuple[str, str]], indices: Mapping[str, int]
 ) -> tuple[Pair, ...]:
-    """The pairs that a `pairs.txt` lists.
-
-    Args:
-        path: That file, for messages.
-        names: File names of reference and source.
-        indices: Index of each view by the file name of its image.
+    """The pairs of file names that a `pairs.txt` lists, as indices of views.
 
     Raises:
         WorkspaceError: If the model lacks an image, or a pair is of one image.

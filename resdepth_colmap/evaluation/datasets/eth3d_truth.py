@@ -30,13 +30,7 @@ _LARGEST_SHIFT = 0.01  # metres; both models have the same camera centres
 def undistorted_truth(
     scene: Eth3dScene, distorted: DistortedView, view: View, camera: Camera
 ) -> DepthMap:
-    """The ground-truth depth of an undistorted image.
-
-    Args:
-        scene: The files.
-        distorted: The distorted image.
-        view: The undistorted image.
-        camera: Its camera at the size of the map.
+    """The ground-truth depth of an undistorted image, at the size of `camera`.
 
     Returns:
         Shape (H, W), float32, in metres; 0 = unknown or masked.
@@ -65,8 +59,7 @@ def _points(
         chosen = pixels[start : start + _PIXELS_AT_ONCE]
         rows, columns = np.divmod(chosen, depth.shape[1])
         centers = np.stack([columns, rows], axis=1) + CENTER_PX  # index to COLMAP
-        rays = distorted.rays(centers)
-        xyz = rays * depth.ravel()[chosen, np.newaxis]
+        xyz = distorted.rays(centers) * depth.ravel()[chosen, np.newaxis]
         yield transform(view_from_distorted, xyz)
 
 

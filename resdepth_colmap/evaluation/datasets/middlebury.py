@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.evaluation.datasets.sample import (
@@ -29,6 +28,9 @@ IMAGE_NAMES = ("im0.png", "im1.png")
 TRUTH_NAMES = ("disp0.pfm", "disp0GT.pfm")
 SEEN_NAMES = ("mask0nocc.png", "mask0-nocc.png")
 
+Calibration = Mapping[str, tuple[float, ...]]
+"""The numbers of calib.txt, by name."""
+
 _MM = 1e-3
 _LEAST_DISPARITY_PX = 1.0  # with doffs; keeps the depth range finite
 _LINE = re.compile(r"\s*(\w+)\s*=\s*(.+?)\s*")
@@ -46,20 +48,22 @@ def read_middlebury_samples(path: Path, options: SampleOptions) -> list[LazySamp
 
 
 def read_middlebury_sample(path: Path, options: SampleOptions) -> DepthSample:
-    """Read a scene as distributed: im0 against im1.
-
-    Args:
-        path: Folder of the scene.
-        options: May have the depth range.
+    """Read a scene as distributed: im0 against im1. `options` may have a depth range.
 
     Raises:
         WorkspaceError: If a file is missing or broken, or sizes differ.
     """
     calibration = read_calibration(path / CALIBRATION_NAME)
     disparity_path = _first_of(path, TRUTH_NAMES)
+    if disparity_path is None:
+        raise WorkspaceError(
+            f"{path}: no {' or '.join(TRUTH_NAMES)}; unpack the ground truth there, "
+            "too."
+        )
     images = [read_gray(path / name) for name in IMAGE_NAMES]
     disparity = read_pfm(disparity_path)
-    seen = _read_seen(path)
+    seen_path = _first_of(path, SEEN_NAMES)  # 255; occluded are grey
+    seen = None if seen_path is None else np.asarray(read_gray(seen_path) == 1)
     shapes = {(path / IMAGE_NAMES[0]): images[0].shape, disparity_path: disparity.shape}
     if seen is not None:
         shapes[path / SEEN_NAMES[0]] = seen.shape
@@ -116,9 +120,7 @@ def read_calibration(path: Path) -> dict[str, tuple[float, ...]]:
     return entries
 
 
-def depth_from_disparity(
-    disparity: FloatMap, calibration: Mapping[str, tuple[float, ...]]
-) -> DepthMap:
+def depth_from_disparity(disparity: FloatMap, calibration: Calibration) -> DepthMap:
     """Depth in metres, same shape, float32; 0 where the disparity is unknown."""
     shifted = disparity + calibration["doffs"][0]
     known = np.isfinite(shifted) & (shifted > 0) & (disparity > 0)
@@ -127,36 +129,21 @@ def depth_from_disparity(
     return depth.astype(np.float32)
 
 
-def _depth_range(calibration: Mapping[str, tuple[float, ...]]) -> tuple[float, float]:
-    """From the largest disparity of calib.txt, ndisp, to a disparity of 0.
-
-    The tight bounds vmin and vmax come from the ground truth, so they are ignored.
-    """
+def _depth_range(calibration: Calibration) -> tuple[float, float]:
+    """From the largest disparity, ndisp, to 0; vmin and vmax come from the truth."""
     doffs, ndisp = calibration["doffs"][0], calibration["ndisp"][0]
     scale = _focal_baseline(calibration)
     far = scale / max(doffs, _LEAST_DISPARITY_PX)
     return scale / max(doffs + ndisp, 2 * _LEAST_DISPARITY_PX), far
 
 
-def _focal_baseline(calibration: Mapping[str, tuple[float, ...]]) -> float:
+def _focal_baseline(calibration: Calibration) -> float:
     return _MM * calibration["baseline"][0] * calibration["cam0"][0]
 
 
-def _matrix(calibration: Mapping[str, tuple[float, ...]], name: str) -> Matrix:
+def _matrix(calibration: Calibration, name: str) -> Matrix:
     return np.array(calibration[name], dtype=np.float64).reshape(3, 3)
 
 
-def _first_of(path: Path, names: tuple[str, ...]) -> Path:
-    for name in names:
-        if (path / name).is_file():
-            return path / name
-    raise WorkspaceError(
-        f"{path}: no {' or '.join(names)}; unpack the ground truth there, too."
-    )
-
-
-def _read_seen(path: Path) -> npt.NDArray[np.bool_] | None:
-    for name in SEEN_NAMES:
-        if (path / name).is_file():
-            return np.asarray(read_gray(path / name) == 1)  # 255; occluded are grey
-    return None
+def _first_of(path: Path, names: tuple[str, ...]) -> Path | None:
+    return next((path / name for name in names if (path / name).is_file()), None)

@@ -64,12 +64,7 @@ class DepthSample:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class SampleOptions:
-    """Options of reading samples.
-
-    Attributes:
-        stereo: Options of the matcher; it uses up to `max_num_sources`.
-        num_sources: Number of source views of the network.
-    """
+    """Options of the matcher, and number of source views of the network."""
 
     stereo: StereoConfig
     num_sources: int

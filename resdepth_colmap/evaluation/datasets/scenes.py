@@ -20,14 +20,9 @@ from resdepth_colmap.evaluation.datasets.workspaces import (
 
 
 def scene_sources(paths: Sequence[Path]) -> tuple[SceneSource, ...]:
-    """The scenes at the paths; they are read later.
+    """The scenes at the paths, or in folders at the paths; they are read later.
 
-    Args:
-        paths: Scenes, or folders of scenes.
-
-    Returns:
-        One source per scene, in the order of the paths. A path that is neither a scene
-        nor a folder of scenes is a source, too: reading it raises the error.
+    A path that is neither is a source, too: reading it raises the error.
     """
     folders = list(dict.fromkeys(f for path in paths for f in _scenes_at(path)))
     names = distinct_names(folders)
@@ -56,10 +51,9 @@ def _reader(path: Path) -> Callable[[Path, SampleOptions], Sequence[LazySample]]
 def distinct_names(folders: Sequence[Path]) -> list[str]:
     """The names of the folders, with as many parents as makes them unique."""
     parts = [folder.absolute().parts for folder in folders]
-    length = 1
-    while length < max(map(len, parts), default=1):
+    names: list[str] = []
+    for length in range(1, max(map(len, parts), default=1) + 1):
         names = ["/".join(it[-length:]) for it in parts]
         if len(set(names)) == len(names):
             break
-        length += 1
-    return ["/".join(it[-length:]) for it in parts]
+    return names

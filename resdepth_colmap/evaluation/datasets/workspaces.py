@@ -31,7 +31,7 @@ from resdepth_colmap.pipeline.initial_map import (
 )
 from resdepth_colmap.pipeline.refine.cross_view import NUM_SOURCE_MAPS
 from resdepth_colmap.pipeline.view_images import ViewImages
-from resdepth_colmap.scene import DepthMap, Scene, UnitColors, View
+from resdepth_colmap.scene import DepthMap, Scene, View
 
 TRUTH_FOLDER = "ground_truth"
 SEEN_SUFFIX = ".nonoccluded.png"
@@ -41,15 +41,11 @@ _WAY_OUT = "see data/README.md for the layout of a workspace with ground truth"
 
 
 def read_workspace_samples(path: Path, options: SampleOptions) -> list[LazySample]:
-    """The views of a workspace with ground truth, and their existing maps.
+    """The views of a workspace with `ground_truth/<image>.bin`, and existing maps.
 
     The initial depth of a view is its map with the fewest holes; a view without a map
     is to be matched against the sources in patch-match.cfg, or the best ones. Nothing
     is written.
-
-    Args:
-        path: A dense workspace with `ground_truth/<image>.bin`, in COLMAP's map format.
-        options: Matcher and number of sources.
 
     Raises:
         WorkspaceError: If the workspace or its ground truth is missing, broken, or
@@ -90,7 +86,9 @@ def _sample(
     options: SampleOptions,
 ) -> DepthSample:
     view = scene.views[index]
-    truth = _truth(workspace, view)
+    truth_path = workspace.truth_path(view.name)
+    truth = read_depth_map(truth_path)
+    _check_shape(truth_path, truth.shape, view)
     initial = _initial(workspace, view)
     num_sources = options.stereo.max_num_sources
     if initial is not None:
@@ -116,22 +114,11 @@ def _sample(
         seen=_seen(workspace, view),
         initial=initial,
         colors=images.colors(view, view.camera),
-        source_colors=_colors(images, scene, sources[:NUM_SOURCE_MAPS]),
+        source_colors=tuple(
+            images.colors(scene.views[other], scene.views[other].camera)
+            for other in sources[:NUM_SOURCE_MAPS]
+        ),
     )
-
-
-def _colors(
-    images: ViewImages, scene: Scene, indices: list[int]
-) -> tuple[UnitColors, ...]:
-    views = (scene.views[index] for index in indices)
-    return tuple(images.colors(view, view.camera) for view in views)
-
-
-def _truth(workspace: Workspace, view: View) -> DepthMap:
-    path = workspace.truth_path(view.name)
-    truth = read_depth_map(path)
-    _check_shape(path, truth.shape, view)
-    return truth
 
 
 def _seen(workspace: Workspace, view: View) -> npt.NDArray[np.bool_] | None:
@@ -165,9 +152,8 @@ def _map_of(workspace: Workspace, view: View) -> DepthMap | None:
 
 def _fullest_map(workspace: Workspace, view: View) -> InitialMap | None:
     kinds = candidate_kinds(workspace, view.name)
-    if not kinds:
-        return None
-    return choose_initial_map(workspace, view.name, view.camera, kinds)
+    name, camera = view.name, view.camera
+    return choose_initial_map(workspace, name, camera, kinds) if kinds else None
 
 
 def _check_shape(path: Path, shape: tuple[int, ...], view: View) -> None:
