@@ -60,13 +60,13 @@ class Config:
         """Plain values only, ready for JSON."""
         return {key: _plain(value) for key, value in vars(self).items()}
 
-    def _check(self, holds: bool, expected: str, **values: object) -> None:
+    def _check(self, holds: bool, expected: str, *names: str) -> None:
+        """ConfigError with the values of the named attributes, unless it holds."""
         if not holds:
-            names = {
-                field.name: field.metadata.get("option", field.name)
-                for field in dataclasses.fields(self)
-            }
-            shown = ", ".join(f"{names[k]}={value!r}" for k, value in values.items())
+            fields = dataclasses.fields(self)
+            options = {it.name: it.metadata.get("option", it.name) for it in fields}
+            values = (f"{options[name]}={getattr(self, name)!r}" for name in names)
+            shown = ", ".join(values)
             raise ConfigError(f"{shown} but expected {expected}.")
 
 
@@ -133,63 +133,50 @@ class StereoConfig(Config):
 
     def __post_init__(self) -> None:
         """Check the ranges once, so that no later code has to."""
-        self._check(
-            1 <= self.window_radius <= 15, "1 to 15", window_radius=self.window_radius
-        )
+        self._check(1 <= self.window_radius <= 15, "1 to 15", "window_radius")
         self._check(
             1 <= self.window_step <= self.window_radius,
             "1 to the window radius",
-            window_step=self.window_step,
+            "window_step",
         )
-        self._check(self.sigma_color > 0, "more than 0", sigma_color=self.sigma_color)
-        self._check(self.smoothness >= 0, "0 or more", smoothness=self.smoothness)
-        self._check(
-            self.num_iterations >= 1, "at least 1", num_iterations=self.num_iterations
-        )
-        self._check(
-            1 <= self.max_num_sources <= 32,
-            "1 to 32",
-            max_num_sources=self.max_num_sources,
-        )
+        self._check(self.sigma_color > 0, "more than 0", "sigma_color")
+        self._check(self.smoothness >= 0, "0 or more", "smoothness")
+        self._check(self.num_iterations >= 1, "at least 1", "num_iterations")
+        self._check(1 <= self.max_num_sources <= 32, "1 to 32", "max_num_sources")
         self._check(
             self.max_image_size == -1 or self.max_image_size >= 32,
             "-1 or at least 32",
-            max_image_size=self.max_image_size,
+            "max_image_size",
         )
         given = not (self.depth_min < 0 and self.depth_max < 0)
         self._check(
             not given or 0 < self.depth_min < self.depth_max,
             "0 < depth_min < depth_max, both given or neither",
-            depth_min=self.depth_min,
-            depth_max=self.depth_max,
+            "depth_min",
+            "depth_max",
         )
-        self._check(self.cache_size >= 0, "0 or more", cache_size=self.cache_size)
+        self._check(self.cache_size >= 0, "0 or more", "cache_size")
         self._check_filter()
 
     def _check_filter(self) -> None:
-        self._check(
-            -1 <= self.filter_min_ncc <= 1,
-            "-1 to 1",
-            filter_min_ncc=self.filter_min_ncc,
-        )
+        self._check(-1 <= self.filter_min_ncc <= 1, "-1 to 1", "filter_min_ncc")
         for name in ("min_triangulation_angle", "filter_min_triangulation_angle"):
-            angle = getattr(self, name)
-            self._check(0 <= angle <= 180, "0 to 180 degrees", **{name: angle})
+            self._check(0 <= getattr(self, name) <= 180, "0 to 180 degrees", name)
         self._check(
             self.filter_min_num_consistent >= 0,
             "at least 0",
-            filter_min_num_consistent=self.filter_min_num_consistent,
+            "filter_min_num_consistent",
         )
         self._check(
             self.filter_geom_consistency_max_cost >= 0,
             "at least 0",
-            filter_geom_consistency_max_cost=self.filter_geom_consistency_max_cost,
+            "filter_geom_consistency_max_cost",
         )
         self._check(
             self.filter or not self.write_consistency_graph,
             "a filter: it is what tells who agrees",
-            write_consistency_graph=self.write_consistency_graph,
-            filter=self.filter,
+            "write_consistency_graph",
+            "filter",
         )
 
 
@@ -228,17 +215,12 @@ class RefineConfig(Config):
     def __post_init__(self) -> None:
         """Check the ranges once, so that no later code has to."""
         for name in ("inner_iterations", "outer_iterations"):
-            value = getattr(self, name)
-            self._check(1 <= value <= 10, "1 to 10", **{name: value})
+            self._check(1 <= getattr(self, name) <= 10, "1 to 10", name)
         self._check(
-            self.tile_px >= 32 and self.tile_px % 32 == 0,
-            "a multiple of 32",
-            tile_px=self.tile_px,
+            self.tile_px >= 32 and self.tile_px % 32 == 0, "a multiple of 32", "tile_px"
         )
         self._check(
-            0 <= self.overlap_px <= self.tile_px // 2,
-            "0 to half a tile",
-            overlap_px=self.overlap_px,
+            0 <= self.overlap_px <= self.tile_px // 2, "0 to half a tile", "overlap_px"
         )
 
 
@@ -269,28 +251,14 @@ class FuseConfig(Config):
 
     def __post_init__(self) -> None:
         """Check the ranges once, so that no later code has to."""
+        self._check(self.min_num_views >= 1, "at least 1", "min_num_views")
+        self._check(0 < self.max_depth_error < 1, "between 0 and 1", "max_depth_error")
+        self._check(self.max_reproj_error > 0, "more than 0", "max_reproj_error")
         self._check(
-            self.min_num_views >= 1, "at least 1", min_num_views=self.min_num_views
+            0 < self.max_normal_error_deg <= 180, "0 to 180", "max_normal_error_deg"
         )
-        self._check(
-            0 < self.max_depth_error < 1,
-            "between 0 and 1",
-            max_depth_error=self.max_depth_error,
-        )
-        self._check(
-            self.max_reproj_error > 0,
-            "more than 0",
-            max_reproj_error=self.max_reproj_error,
-        )
-        self._check(
-            0 < self.max_normal_error_deg <= 180,
-            "0 to 180",
-            max_normal_error_deg=self.max_normal_error_deg,
-        )
-        self._check(
-            0 <= self.min_confidence <= 1, "0 to 1", min_confidence=self.min_confidence
-        )
-        self._check(self.voxel_size >= 0, "0 or more", voxel_size=self.voxel_size)
+        self._check(0 <= self.min_confidence <= 1, "0 to 1", "min_confidence")
+        self._check(self.voxel_size >= 0, "0 or more", "voxel_size")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -313,11 +281,11 @@ class SynthesisConfig(Config):
 
     def __post_init__(self) -> None:
         """Check the ranges once, so that no later code has to."""
-        self._check(self.num_scenes >= 1, "at least 1", num_scenes=self.num_scenes)
-        self._check(2 <= self.num_views <= 12, "2 to 12", num_views=self.num_views)
+        self._check(self.num_scenes >= 1, "at least 1", "num_scenes")
+        self._check(2 <= self.num_views <= 12, "2 to 12", "num_views")
         self._check(
             min(self.width_px, self.height_px) >= 32,
             "at least 32",
-            width_px=self.width_px,
-            height_px=self.height_px,
+            "width_px",
+            "height_px",
         )

@@ -81,21 +81,21 @@ class NetworkConfig(Config):
         for name, kind in (("variant", InputVariant), ("normalisation", Normalisation)):
             value = getattr(self, name)
             choices = [str(choice) for choice in kind]
-            self._check(value in choices, " or ".join(choices), **{name: value})
+            self._check(value in choices, " or ".join(choices), name)
             object.__setattr__(self, name, kind(value))
-        self._check(1 <= self.levels <= 9, "1 to 9", levels=self.levels)
+        self._check(1 <= self.levels <= 9, "1 to 9", "levels")
         self._check(
             1 <= self.base_channels <= self.max_channels <= 1024,
             "1 <= base_channels <= max_channels <= 1024",
-            base_channels=self.base_channels,
-            max_channels=self.max_channels,
+            "base_channels",
+            "max_channels",
         )
-        self._check(1 <= self.num_sources <= 8, "1 to 8", num_sources=self.num_sources)
+        self._check(1 <= self.num_sources <= 8, "1 to 8", "num_sources")
         self._check(
             self.propagation_channels % 3 == 0
             and 0 <= self.propagation_channels <= 384,
             "a multiple of 3, 0 to 384",
-            propagation_channels=self.propagation_channels,
+            "propagation_channels",
         )
 
     @classmethod

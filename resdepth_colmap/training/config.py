@@ -115,28 +115,18 @@ class TrainConfig(Config):
         for name, kind in _WORDS.items():
             value = getattr(self, name)
             choices = [str(choice) for choice in kind]
-            self._check(value in choices, " or ".join(choices), **{name: value})
+            self._check(value in choices, " or ".join(choices), name)
             object.__setattr__(self, name, kind(value))
         for name in _AT_LEAST_ONE:
-            value = getattr(self, name)
-            self._check(value >= 1, "at least 1", **{name: value})
+            self._check(getattr(self, name) >= 1, "at least 1", name)
         for name in _NOT_NEGATIVE:
-            value = getattr(self, name)
-            self._check(value >= 0, "0 or more", **{name: value})
+            self._check(getattr(self, name) >= 0, "0 or more", name)
         self._check(
-            self.crop_px >= 32 and self.crop_px % 32 == 0,
-            "a multiple of 32",
-            crop_px=self.crop_px,
+            self.crop_px >= 32 and self.crop_px % 32 == 0, "a multiple of 32", "crop_px"
         )
-        self._check(
-            self.learning_rate > 0, "more than 0", learning_rate=self.learning_rate
-        )
-        self._check(0 <= self.holes_share <= 1, "0 to 1", holes_share=self.holes_share)
-        self._check(
-            0 <= self.validation_share <= 0.5,
-            "0 to 0.5",
-            validation_share=self.validation_share,
-        )
+        self._check(self.learning_rate > 0, "more than 0", "learning_rate")
+        self._check(0 <= self.holes_share <= 1, "0 to 1", "holes_share")
+        self._check(0 <= self.validation_share <= 0.5, "0 to 0.5", "validation_share")
 
     @classmethod
     def of(cls, preset: Preset, options: dict[str, Any] | None = None) -> Self:

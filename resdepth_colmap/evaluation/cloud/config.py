@@ -31,22 +31,18 @@ class CloudConfig(Config):
         self._check(
             bool(self.tolerances) and is_increasing(self.tolerances),
             "one or more distances above 0, increasing, in metres",
-            tolerances=self.tolerances,
+            "tolerances",
         )
-        self._check(
-            0 < self.voxel_size < math.inf,
-            "a length above 0",
-            voxel_size=self.voxel_size,
-        )
+        self._check(0 < self.voxel_size < math.inf, "a length above 0", "voxel_size")
         self._check(
             0 <= self.beam_start_radius_meters < math.inf,
             "a length, 0 or more",
-            beam_start_radius_meters=self.beam_start_radius_meters,
+            "beam_start_radius_meters",
         )
         self._check(
             0 <= self.beam_divergence_halfangle_deg < 45,
             "an angle of 0 to 45 degrees",
-            beam_divergence_halfangle_deg=self.beam_divergence_halfangle_deg,
+            "beam_divergence_halfangle_deg",
         )
 
 

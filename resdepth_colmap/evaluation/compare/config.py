@@ -39,15 +39,13 @@ class CompareConfig(Config):
     def __post_init__(self) -> None:
         """Check the values."""
         self._check(
-            is_increasing(self.tolerances),
-            "increasing distances above 0",
-            tolerances=self.tolerances,
+            is_increasing(self.tolerances), "increasing distances above 0", "tolerances"
         )
         self._check(
             not self.filtered or self.filtered != self.unfiltered,
             "two kinds of map",
-            unfiltered=self.unfiltered,
-            filtered=self.filtered,
+            "unfiltered",
+            "filtered",
         )
 
     def to_mapping(self) -> dict[str, Any]:
