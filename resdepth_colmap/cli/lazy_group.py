@@ -16,15 +16,7 @@ class LazyGroup(click.Group):
         commands_in: tuple[str, ...],
         **kwargs: Any,
     ) -> None:
-        """Make a group of commands that are not imported yet.
-
-        Args:
-            args: As those of click's Group.
-            module_prefix: What precedes the name of a command in that of its module.
-            commands_in: Names of the commands, in the order a user meets them; each is
-                an attribute of that name in its module.
-            kwargs: As those of click's Group.
-        """
+        """The attribute NAME of the module PREFIX + NAME, for each name, in order."""
         super().__init__(*args, **kwargs)
         self.module_prefix = module_prefix
         self.commands_in = commands_in

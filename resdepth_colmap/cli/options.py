@@ -50,31 +50,23 @@ def command(short_help: str, *lines: str) -> Callable[[Command], click.Command]:
 
 def verbosity_options(function: Command) -> Command:
     """Give a command -v and -q, before or after its name."""
-    louder = click.option(
-        "-v",
-        "--verbose",
-        count=True,
-        expose_value=False,
-        callback=lambda context, _option, count: _log_more(context, count),
-        help="Say more; twice: say everything.",
-    )
-    quieter = click.option(
-        "-q",
-        "--quiet",
-        count=True,
-        expose_value=False,
-        callback=lambda context, _option, count: _log_more(context, -count),
-        help="Warnings only; twice: errors only.",
-    )
-    return louder(quieter(function))
 
+    def option(*names: str, sign: int, text: str) -> Callable[[Command], Command]:
+        def log_more(context: click.Context, _option: object, count: int) -> None:
+            from resdepth_colmap.cli.log import start_log
 
-def _log_more(context: click.Context, change: int) -> None:
-    from resdepth_colmap.cli.log import start_log
+            root = context.find_root()
+            root.obj = (root.obj or 0) + sign * count
+            start_log(root.obj)
 
-    root = context.find_root()
-    root.obj = (root.obj or 0) + change
-    start_log(root.obj)
+        return click.option(
+            *names, count=True, expose_value=False, callback=log_more, help=text
+        )
+
+    text = "Say more; twice: say everything."
+    louder = option("-v", "--verbose", sign=1, text=text)
+    text = "Warnings only; twice: errors only."
+    return louder(option("-q", "--quiet", sign=-1, text=text)(function))
 
 
 def enum_option(

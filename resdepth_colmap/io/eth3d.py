@@ -74,11 +74,7 @@ class Eth3dScene:
         )
 
     def check_parts(self) -> None:
-        """Check that the three archives were unpacked here.
-
-        Raises:
-            WorkspaceError: Naming the folder that is missing, and its archive.
-        """
+        """WorkspaceError, naming folder and archive, if one was not unpacked here."""
         parts = {
             UNDISTORTED: "dslr_undistorted",
             "images": "dslr_undistorted",

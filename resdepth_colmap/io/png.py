@@ -39,9 +39,11 @@ def encode_png(values: npt.NDArray[np.uint8] | npt.NDArray[np.uint16]) -> bytes:
     mode = _MODES.get((values.ndim, values.dtype.name))
     if mode is None or (mode == "RGB" and values.shape[2] != 3):
         raise ValueError(f"{values.shape=}, {values.dtype=} but expected RGB or grey.")
-    if is_zlib_sound():
-        return _encode_here(values)
-    return _encode_elsewhere(values, mode)
+    if not is_zlib_sound():
+        return _encode_elsewhere(values, mode)
+    memory = io.BytesIO()
+    Image.fromarray(values).save(memory, format="PNG")
+    return memory.getvalue()
 
 
 def is_zlib_sound() -> bool:
@@ -51,12 +53,6 @@ def is_zlib_sound() -> bool:
         return True
     loaded_before = modules[: modules.index("pycolmap._core")]
     return "zlib" in loaded_before
-
-
-def _encode_here(values: npt.NDArray[np.uint8] | npt.NDArray[np.uint16]) -> bytes:
-    memory = io.BytesIO()
-    Image.fromarray(values).save(memory, format="PNG")
-    return memory.getvalue()
 
 
 def _encode_elsewhere(

@@ -30,7 +30,6 @@ from resdepth_colmap.evaluation.compare.methods import (
 )
 from resdepth_colmap.evaluation.compare.view_metrics import (
     MeasuredView,
-    MetricInputs,
     measure_views,
 )
 from resdepth_colmap.evaluation.datasets.scenes import distinct_names
@@ -122,30 +121,28 @@ def _compared(
     workspace = open_workspace(path)
     scene = read_scene(workspace.sparse_path, workspace.images_path, workspace.path)
     output = OutputWorkspace(source=workspace, in_place=in_place)
-    found = find_methods(output, scene, config)
-    check_images(workspace, dataclasses.replace(scene, views=found.views))
+    methods, notes = find_methods(output, scene, config)
+    compared = tuple(file.view for file in methods[0].files)
+    check_images(workspace, dataclasses.replace(scene, views=compared))
     reference = read_reference_cloud(workspace, scene, config.tolerances)
-    inputs = MetricInputs(
-        scene=scene,
-        images=ViewImages(workspace, IMAGE_CACHE_BYTES),
-        points=read_sparse_points(workspace.sparse_path).about(scene.origin_in_world),
-        reference=reference,
-    )
-    maps = MethodMaps(found.methods, config.fuse.min_confidence)
-    views = measure_views(maps, inputs, progress)
-    clouds = fuse_methods(workspace, scene, found.methods, config.fuse, progress)
+    points = read_sparse_points(workspace.sparse_path).about(scene.origin_in_world)
+    images = ViewImages(workspace, IMAGE_CACHE_BYTES)
+    known = {it.view.name: it.depth for it in (reference.maps if reference else ())}
+    maps = MethodMaps(methods, config.fuse.min_confidence)
+    views = measure_views(maps, scene, images, points, known, progress)
+    clouds = fuse_methods(workspace, scene, methods, config.fuse, progress)
     truth = truth or reference
     return {
-        "views": [view.name for view in found.views],
-        "methods": {method.name: method.to_mapping() for method in found.methods},
-        "notes": [*found.notes, *_notes(scene, truth, reference, views)],
-        "fusion": fusion_settings(config.fuse, len(found.views)),
+        "views": [view.name for view in compared],
+        "methods": {method.name: method.to_mapping() for method in methods},
+        "notes": [*notes, *_notes(scene, truth, reference, views)],
+        "fusion": fusion_settings(config.fuse, len(compared)),
         "truth": None if truth is None else truth.to_mapping(),
         "clouds": {
-            fuser: {name: _scored(it, truth, progress) for name, it in methods.items()}
-            for fuser, methods in clouds.items()
+            fuser: {name: _scored(it, truth, progress) for name, it in fused.items()}
+            for fuser, fused in clouds.items()
         },
-        **_measures(views, [method.name for method in found.methods]),
+        **_measures(views, [method.name for method in methods]),
         "seconds": round(time.perf_counter() - start, 2),
     }
 

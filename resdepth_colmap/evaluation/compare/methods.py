@@ -47,49 +47,29 @@ class Method:
     kind: str
     files: tuple[MapFiles, ...]
 
-    @property
-    def own_normals(self) -> bool:
-        """Whether every view has a normal map; else they come from the depth."""
-        return all(
-            file.normal_path is not None and file.normal_path.is_file()
-            for file in self.files
-        )
-
     def to_mapping(self) -> dict[str, str]:
         """Kind and normals, ready for JSON."""
-        normals = "own" if self.own_normals else "computed from the depth"
+        paths = [file.normal_path for file in self.files]
+        has_all = all(path is not None and path.is_file() for path in paths)
+        normals = "own" if has_all else "computed from the depth"
         return {"kind": self.kind, "normals": normals}
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
-class FoundMethods:
-    """The methods that a workspace has maps of.
-
-    Attributes:
-        methods: The refined maps, and the filtered or unfiltered ones or both, of the
-            same views.
-        notes: What is missing.
-    """
-
-    methods: tuple[Method, ...]
-    notes: tuple[str, ...]
-
-    @property
-    def views(self) -> tuple[View, ...]:
-        """The compared views: every method has a map of each."""
-        return tuple(file.view for file in self.methods[0].files)
 
 
 def find_methods(
     output: OutputWorkspace, scene: Scene, config: CompareConfig
-) -> FoundMethods:
+) -> tuple[list[Method], list[str]]:
     """Find the methods of a workspace by the share of pixels that its maps fill.
+
+    Returns:
+        The refined maps, and the filtered or unfiltered ones or both, of the same
+        views; notes on what is missing.
 
     Raises:
         WorkspaceError: If there are no refined maps, no initial ones, no view that has
             both, or a map is broken.
     """
     workspace = output.source
+    folder = workspace.stereo_path / "depth_maps"
     refined = [view for view in scene.views if output.is_written(view.name)]
     if not refined:
         raise WorkspaceError(
@@ -99,18 +79,16 @@ def find_methods(
     kinds = {view.name: workspace.original_kinds(view.name) for view in refined}
     if not any(kinds.values()):
         raise WorkspaceError(
-            f"{workspace.stereo_path / 'depth_maps'}: no depth map of any refined "
-            "image, so there is nothing to compare the refined maps with; make some "
-            "with `resdepth-colmap stereo`."
+            f"{folder}: no depth map of any refined image, so there is nothing to "
+            "compare the refined maps with; make some with `resdepth-colmap stereo`."
         )
     chosen = _chosen_kinds(workspace, _filled_shares(workspace, refined, kinds), config)
     compared = [v for v in refined if set(chosen.values()) <= set(kinds[v.name])]
     if not compared:
         named = " and ".join(chosen.values())
         raise WorkspaceError(
-            f"{workspace.stereo_path / 'depth_maps'}: no image has {named} maps and a "
-            "refined one; refine more images, or choose with --filtered and "
-            "--unfiltered."
+            f"{folder}: no image has {named} maps and a refined one; refine more "
+            "images, or choose with --filtered and --unfiltered."
         )
     notes = [f"{name}: {text}" for name, text in _WITHOUT.items() if name not in chosen]
     if len(compared) < len(scene.views):
@@ -118,24 +96,19 @@ def find_methods(
             f"{len(compared)} of {len(scene.views)} views are compared: the others "
             "lack a map of some method."
         )
-    compared_names = {view.name for view in compared}
+    names = {view.name for view in compared}
     files = {
         name: tuple(_initial_file(workspace, view, kind) for view in compared)
         for name, kind in chosen.items()
     }
-    files[REFINED] = tuple(
-        file
-        for file in refined_files(output, scene)
-        if file.view.name in compared_names
-    )
-    return FoundMethods(
-        methods=tuple(
-            Method(name=name, kind=chosen.get(name, REFINED), files=files[name])
-            for name in METHODS
-            if name in files
-        ),
-        notes=tuple(notes),
-    )
+    every = refined_files(output, scene)
+    files[REFINED] = tuple(file for file in every if file.view.name in names)
+    methods = [
+        Method(name=name, kind=chosen.get(name, REFINED), files=files[name])
+        for name in METHODS
+        if name in files
+    ]
+    return methods, notes
 
 
 def _filled_shares(

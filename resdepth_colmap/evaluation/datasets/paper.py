@@ -13,14 +13,9 @@ PAPER_IMAGE_WIDTH_PX = 886
 
 
 class PaperRow(NamedTuple):
-    """A row of the table; errors in metres.
+    """A row of the table: errors in metres of ResDepth-stereo and unfiltered COLMAP.
 
-    Attributes:
-        num_pairs: Number of stereo pairs, picked by hand and not published.
-        refined_mae: ResDepth-stereo, mean absolute error.
-        refined_rmse: ResDepth-stereo, root mean square error.
-        unfiltered_mae: Unfiltered COLMAP, likewise.
-        unfiltered_rmse: Unfiltered COLMAP, likewise.
+    The pairs were picked by hand and not published.
     """
 
     num_pairs: int
