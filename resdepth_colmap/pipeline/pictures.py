@@ -7,7 +7,7 @@ import numpy as np
 
 from resdepth_colmap.geometry.resize import nearest_resized
 from resdepth_colmap.io.colmap.depth_map import read_depth_map
-from resdepth_colmap.io.colmap.output import OutputWorkspace
+from resdepth_colmap.io.colmap.output import OVERVIEW_NAME, OutputWorkspace
 from resdepth_colmap.io.files import safe_name
 from resdepth_colmap.io.images import read_rgb, write_png
 from resdepth_colmap.pipeline.initial_map import map_path
@@ -17,7 +17,6 @@ from resdepth_colmap.scene import Scene
 from resdepth_colmap.viz.strips import BeforeAfter, depth_strip, overview, thumbnails
 
 FOLDER = "pictures"
-OVERVIEW_NAME = "overview.png"
 MOST_IN_OVERVIEW = 12
 
 

@@ -30,6 +30,9 @@ from resdepth_colmap.scene import DepthMap, FloatMap, NormalMap
 KIND = "geometric"
 """Refined maps are called so, because COLMAP's fusion takes this kind by default."""
 
+OVERVIEW_NAME = "overview.png"
+"""The picture of the whole workspace, in its output."""
+
 _MODEL_FILES = frozenset(
     f"{part}{suffix}" for part in MODEL_PARTS for suffix in (".bin", ".txt")
 )

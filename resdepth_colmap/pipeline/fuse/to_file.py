@@ -75,7 +75,11 @@ def fuse_to_file(
 
 
 class Clouds:
-    """The clouds of a workspace; one that is fresh is not made again."""
+    """The clouds of a workspace; one that is fresh is not made again.
+
+    Attributes:
+        num_made: Clouds made until now.
+    """
 
     def __init__(
         self,
@@ -97,6 +101,7 @@ class Clouds:
         self._config = config
         self._progress = progress
         self._manifest = Manifest(output.path)
+        self.num_made = 0
 
     def refined(self, path: Path, overwrite: bool) -> dict[str, Any]:
         """The cloud of the refined maps; returns what is known of it.
@@ -156,6 +161,7 @@ class Clouds:
         self, task: Task, make: Callable[[], dict[str, Any]], overwrite: bool
     ) -> dict[str, Any]:
         if overwrite or not self._manifest.is_fresh(task):
+            self.num_made += 1
             self._manifest.start(task)
             self._manifest.finish(task, make())
         self._manifest.save()
