@@ -46,13 +46,7 @@ def show_result(
     as_json: bool,
     output: Path | None,
 ) -> None:
-    """Print a result and write it to a file.
-
-    Args:
-        result: Plain values.
-        show: Prints the result as tables.
-        as_json: Whether to print JSON instead.
-        output: The file; None = none.
+    """Print a result, as JSON or with `show`, and write its JSON to a file.
 
     Raises:
         WorkspaceError: If the file cannot be written.
@@ -71,13 +65,9 @@ def show_result(
 def exit_if_failed(
     failed: Collection[str], num_total: int, noun: str, *, as_json: bool
 ) -> None:
-    """List what failed, on stderr with JSON, and exit with code 1; return if nothing.
+    """Exit with code 1 if any of the workspaces or scenes (`noun`) failed.
 
-    Args:
-        failed: Names of workspaces or scenes.
-        num_total: Number of those with and without a result.
-        noun: What they are, in the plural.
-        as_json: Whether stdout has JSON.
+    A summary names them: on stdout, or on stderr where stdout has JSON.
     """
     if failed:
         names = ", ".join(failed)

@@ -2,7 +2,7 @@
 
 import base64
 import dataclasses
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from resdepth_colmap.io.point_cloud import PointCloud
@@ -129,8 +129,3 @@ def color_tables() -> dict[str, Any]:
         "errorRange": list(ERROR_RANGE),
         "confidenceLevels": CONFIDENCE_LEVELS,
     }
-
-
-def total_bytes(contents: Iterable[Content]) -> int:
-    """Bytes of all blocks in the page."""
-    return sum(content.num_bytes for content in contents)

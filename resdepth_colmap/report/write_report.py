@@ -20,7 +20,6 @@ from resdepth_colmap.report.content import (
     cloud_content,
     color_tables,
     image_content,
-    total_bytes,
 )
 from resdepth_colmap.report.facts import (
     image_facts,
@@ -94,7 +93,7 @@ class _Report:
             page = self._page(contents, cloud)
             if len(page) <= MOST_BYTES:
                 return page
-            num_bytes = total_bytes(contents)
+            num_bytes = sum(content.num_bytes for content in contents)
             spare = MOST_BYTES - (len(page) - num_bytes)
             budget = budget.shrunk(num_bytes, spare)
 
