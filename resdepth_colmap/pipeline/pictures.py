@@ -12,6 +12,7 @@ from resdepth_colmap.io.colmap.depth_map import read_depth_map
 from resdepth_colmap.io.colmap.output import OutputWorkspace
 from resdepth_colmap.io.images import read_rgb, write_png
 from resdepth_colmap.pipeline.initial_map import map_path
+from resdepth_colmap.pipeline.masks import masked_depth
 from resdepth_colmap.pipeline.refine.stage import RefineReport
 from resdepth_colmap.progress import Progress
 from resdepth_colmap.scene import ColorImage, Scene
@@ -187,10 +188,12 @@ def _row(content: BeforeAfter) -> _Row:
 def _load(output: OutputWorkspace, report: RefineReport, name: str) -> BeforeAfter:
     source = output.source
     before = read_depth_map(map_path(source, name, report.images[name]["input"]))
+    before = masked_depth(source.masks, name, before)
     after = read_depth_map(output.depth_map_path(name))
     truth_path = source.truth_path(name)
     truth = None
     if truth_path.is_file():
         truth = nearest_resized(read_depth_map(truth_path), before.shape[::-1])
+        truth = masked_depth(source.masks, name, truth)
     rgb = read_rgb(source.image_path(name))
     return BeforeAfter(name=name, rgb=rgb, before=before, after=after, truth=truth)
