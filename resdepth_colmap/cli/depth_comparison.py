@@ -32,7 +32,6 @@ _IRRELEVANT = (
     "filter_min_num_consistent",
     "filter_geom_consistency_max_cost",
     "write_consistency_graph",
-    "mask_path",
     "cache_size",
 )
 """Options of StereoConfig that do not change an unfiltered map of full size."""

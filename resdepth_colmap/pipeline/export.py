@@ -1,6 +1,5 @@
 """Stage "export": depth maps for programs that do not know COLMAP's format."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 from resdepth_colmap.errors import WorkspaceError
@@ -16,6 +15,7 @@ from resdepth_colmap.io.exported_map import (
 )
 from resdepth_colmap.pipeline.export_config import REFINED, MapFormat
 from resdepth_colmap.pipeline.initial_map import map_path
+from resdepth_colmap.pipeline.masks import masked_depth
 from resdepth_colmap.progress import Progress, SilentProgress
 from resdepth_colmap.scene import DepthMap
 
@@ -33,7 +33,7 @@ def export_maps(
     """Write the depth maps of a workspace in another format.
 
     Args:
-        workspace: Whose maps.
+        workspace: Whose maps; where its masks are 0, there is no depth in the files.
         output: Folder for `<image name><.npy, .pfm or .png>`; for 16-bit PNG also
             `depth_scale.json`, whose "unit" is the depth of one step of the value, the
             same for all maps.
@@ -52,7 +52,8 @@ def export_maps(
     unit = 1.0
     written = []
     if kind is MapFormat.PNG16:
-        unit = max(float(depth.max()) for depth in _read_all(paths)) / MAX_PNG_VALUE
+        depths = (_read(workspace, *item) for item in paths.items())
+        unit = max(float(depth.max()) for depth in depths) / MAX_PNG_VALUE
         unit = unit or 1.0  # maps without any depth
         written.append(output / SCALE_NAME)
         facts = {"unit": unit, "depth": "value * unit", "no_depth": 0}
@@ -60,7 +61,7 @@ def export_maps(
     with progress.stage("Exporting", len(paths)) as advance:
         for name, path in paths.items():
             target = output / f"{name}{_SUFFIXES[kind]}"
-            _write(target, read_depth_map(path), kind, unit)
+            _write(target, _read(workspace, name, path), kind, unit)
             written.append(target)
             advance(1)
     return tuple(written)
@@ -95,8 +96,8 @@ def _kinds(workspace: Workspace, names: list[str]) -> str:
     return ", ".join(sorted(kinds)) or "none at all"
 
 
-def _read_all(paths: dict[str, Path]) -> Iterator[DepthMap]:
-    return (read_depth_map(path) for path in paths.values())
+def _read(workspace: Workspace, name: str, path: Path) -> DepthMap:
+    return masked_depth(workspace.masks, name, read_depth_map(path))
 
 
 def _write(path: Path, depth: DepthMap, kind: MapFormat, unit: float) -> None:

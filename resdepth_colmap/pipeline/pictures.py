@@ -11,6 +11,7 @@ from resdepth_colmap.io.colmap.output import OVERVIEW_NAME, OutputWorkspace
 from resdepth_colmap.io.files import safe_name
 from resdepth_colmap.io.images import read_rgb, write_png
 from resdepth_colmap.pipeline.initial_map import map_path
+from resdepth_colmap.pipeline.masks import masked_depth
 from resdepth_colmap.pipeline.refine.stage import RefineReport
 from resdepth_colmap.progress import Progress
 from resdepth_colmap.scene import Scene
@@ -69,10 +70,12 @@ def evenly_chosen(names: Sequence[str], most: int) -> list[str]:
 def _load(output: OutputWorkspace, report: RefineReport, name: str) -> BeforeAfter:
     source = output.source
     before = read_depth_map(map_path(source, name, report.images[name]["input"]))
+    before = masked_depth(source.masks, name, before)
     after = read_depth_map(output.depth_map_path(name))
     truth_path = source.truth_path(name)
     truth = None
     if truth_path.is_file():
         truth = nearest_resized(read_depth_map(truth_path), before.shape[::-1])
+        truth = masked_depth(source.masks, name, truth)
     rgb = read_rgb(source.image_path(name))
     return BeforeAfter(name=name, rgb=rgb, before=before, after=after, truth=truth)

@@ -21,6 +21,7 @@ from resdepth_colmap.io.colmap.output import (
 )
 from resdepth_colmap.io.colmap.workspace import check_images, open_workspace
 from resdepth_colmap.pipeline.fuse.to_file import Clouds, cloud_path
+from resdepth_colmap.pipeline.masks import mask_facts, with_masks
 from resdepth_colmap.pipeline.refine.stage import (
     Network,
     RefineReport,
@@ -85,6 +86,7 @@ def run_refine(
     workspace = open_workspace(path)
     scene = read_scene(workspace.sparse_path, workspace.images_path, workspace.path)
     check_images(workspace, scene)
+    workspace = with_masks(workspace, scene, config.masks)
     network = load_network(config.refine)
     output = OutputWorkspace(source=workspace, in_place=config.in_place)
     output.prepare([view.name for view in scene.views])
@@ -215,6 +217,7 @@ class _Run:
             "refined": refine.refined,
             "kept": refine.kept,
             "skipped": dict(refine.skipped),
+            "masks": mask_facts(self.workspace),
             **self.facts,
         }
         path = self.output.record_path

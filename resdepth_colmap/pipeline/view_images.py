@@ -3,23 +3,27 @@
 import collections
 from collections.abc import Callable, Hashable
 from pathlib import Path
+from typing import Any, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 from resdepth_colmap.geometry.resize import area_resized, nearest_resized
 from resdepth_colmap.io.colmap.depth_map import read_depth_map
 from resdepth_colmap.io.colmap.workspace import Workspace, original_map_path
 from resdepth_colmap.io.images import read_gray, read_unit_colors
+from resdepth_colmap.pipeline.masks import wanted_pixels
 from resdepth_colmap.scene import (
     Camera,
     DepthMap,
-    FloatMap,
     GrayImage,
     UnitColors,
     View,
+    Wanted,
 )
 
 Size = tuple[int, int]
+Value = TypeVar("Value", bound=np.generic)
 
 
 class ArrayCache:
@@ -32,7 +36,7 @@ class ArrayCache:
     def __init__(self, max_num_bytes: int) -> None:
         """Keep nothing yet."""
         self.max_num_bytes = max_num_bytes
-        self._kept: collections.OrderedDict[Hashable, FloatMap] = (
+        self._kept: collections.OrderedDict[Hashable, npt.NDArray[Any]] = (
             collections.OrderedDict()
         )
 
@@ -41,7 +45,9 @@ class ArrayCache:
         """Memory of what is kept."""
         return sum(array.nbytes for array in self._kept.values())
 
-    def get(self, key: Hashable, load: Callable[[], FloatMap]) -> FloatMap:
+    def get(
+        self, key: Hashable, load: Callable[[], npt.NDArray[Value]]
+    ) -> npt.NDArray[Value]:
         """What is kept under that key; else what `load` returns, and it is kept."""
         if key not in self._kept:
             array = load()
@@ -106,6 +112,23 @@ class ViewImages:
         size = (camera.width_px, camera.height_px)
         key = (view.name, size, kind)
         return self.cache.get(key, lambda: self._load_depth(view, size, kind))
+
+    def wanted(self, view: View, camera: Camera) -> Wanted | None:
+        """The mask of a view at the size of `camera`; None = all pixels are wanted.
+
+        Raises:
+            WorkspaceError: If the mask cannot be read, or is of another shape.
+        """
+        masks = self.workspace.masks
+        if not masks.files(view.name):
+            return None
+        size = (camera.width_px, camera.height_px)
+
+        def load() -> Wanted:
+            wanted = wanted_pixels(masks, view.name, size)
+            return np.ones(size[::-1], np.bool_) if wanted is None else wanted
+
+        return self.cache.get((view.name, size, "mask"), load)
 
     def whole_map(self, path: Path) -> DepthMap:
         """The depth map of a file, as it was before any run in place; 0 = no depth.

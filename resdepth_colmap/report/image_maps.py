@@ -13,6 +13,7 @@ from resdepth_colmap.io.colmap.depth_map import read_depth_map
 from resdepth_colmap.io.colmap.output import OutputWorkspace
 from resdepth_colmap.io.images import read_rgb
 from resdepth_colmap.pipeline.initial_map import map_path
+from resdepth_colmap.pipeline.masks import masked_depth
 from resdepth_colmap.scene import ColorImage, DepthMap, FloatMap
 
 
@@ -85,7 +86,7 @@ def image_errors(
 
 
 def load_maps(output: OutputWorkspace, name: str, kind: str) -> ImageMaps:
-    """Read the maps of one image.
+    """Read the maps of one image, without what its mask leaves out.
 
     Args:
         output: Has the refined maps; its source the photo, the initial map and maybe
@@ -98,22 +99,25 @@ def load_maps(output: OutputWorkspace, name: str, kind: str) -> ImageMaps:
     """
     source = output.source
     after_path = output.depth_map_path(name)
-    after = read_depth_map(after_path)
+    after = masked_depth(source.masks, name, read_depth_map(after_path))
     before = read_depth_map(map_path(source, name, kind))
+    before = masked_depth(source.masks, name, before)
     _check_size(after_path, after, "the initial map", before)
     confidence_path = output.confidence_map_path(name)
     confidence = _read_if_present(confidence_path)
     if confidence is not None:
         _check_size(confidence_path, confidence, "the depth map", after)
     truth = _read_if_present(source.truth_path(name))
-    height_px, width_px = after.shape
+    if truth is not None:
+        truth = nearest_resized(truth, (after.shape[1], after.shape[0]))
+        truth = masked_depth(source.masks, name, truth)
     return ImageMaps(
         name=name,
         rgb=read_rgb(source.image_path(name)),
         before=before,
         after=after,
         confidence=confidence,
-        truth=_resized_or_none(truth, (width_px, height_px)),
+        truth=truth,
     )
 
 

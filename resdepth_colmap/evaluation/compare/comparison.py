@@ -36,6 +36,7 @@ from resdepth_colmap.io.colmap.model import read_scene
 from resdepth_colmap.io.colmap.output import OutputWorkspace
 from resdepth_colmap.io.colmap.sparse_points import read_sparse_points
 from resdepth_colmap.io.colmap.workspace import check_images, open_workspace
+from resdepth_colmap.pipeline.masks import with_masks
 from resdepth_colmap.pipeline.view_images import ViewImages
 from resdepth_colmap.progress import Progress, SilentProgress
 from resdepth_colmap.scene import Scene
@@ -121,6 +122,7 @@ def compare_workspace(
     start, progress = time.perf_counter(), progress or SilentProgress()
     workspace = open_workspace(path)
     scene = read_scene(workspace.sparse_path, workspace.images_path, workspace.path)
+    workspace = with_masks(workspace, scene, config.masks, after_run=True)
     output = OutputWorkspace(source=workspace, in_place=in_place)
     found = find_methods(output, scene, config)
     check_images(workspace, dataclasses.replace(scene, views=found.views))

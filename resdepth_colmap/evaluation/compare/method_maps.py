@@ -64,7 +64,7 @@ def confident_depth(file: MapFiles, min_confidence: float) -> DepthMap:
     Raises:
         WorkspaceError: If a map cannot be read.
     """
-    depth = read_depth_map(file.depth_path)
+    depth = file.read_depth()
     path = file.confidence_path
     if min_confidence > 0 and path is not None and path.is_file():
         depth = np.where(read_depth_map(path) >= min_confidence, depth, np.float32(0))

@@ -4,13 +4,17 @@ import dataclasses
 import shlex
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.evaluation.compare.config import CompareConfig
+from resdepth_colmap.io.colmap.depth_map import read_depth_map, read_map_size
 from resdepth_colmap.io.colmap.output import OutputWorkspace
 from resdepth_colmap.io.colmap.workspace import Workspace, original_map_path
 from resdepth_colmap.pipeline.fuse.stage import refined_files
 from resdepth_colmap.pipeline.fuse.views import MapFiles
 from resdepth_colmap.pipeline.initial_map import choose_initial_map, map_path
+from resdepth_colmap.pipeline.masks import wanted_pixels
 from resdepth_colmap.pipeline.refine.cross_view import FILTERED_SHARE
 from resdepth_colmap.scene import Scene, View
 
@@ -139,12 +143,18 @@ def find_methods(
 def _filled_shares(
     workspace: Workspace, views: Sequence[View], kinds: Mapping[str, Sequence[str]]
 ) -> dict[str, float]:
-    """Mean share of pixels with a depth, by kind."""
+    """Mean share of pixels with a depth, of those that are wanted, by kind."""
     shares: dict[str, list[float]] = {}
     for view in views:
         for kind in kinds[view.name]:
             found = choose_initial_map(workspace, view.name, view.camera, [kind])
-            shares.setdefault(kind, []).append(found.filled)
+            share = found.filled
+            size_px = read_map_size(found.path)
+            wanted = wanted_pixels(workspace.masks, view.name, size_px)
+            if wanted is not None:
+                depth = read_depth_map(found.path)[wanted]
+                share = float(np.count_nonzero(depth) / max(1, depth.size))
+            shares.setdefault(kind, []).append(share)
     return {kind: sum(values) / len(values) for kind, values in shares.items()}
 
 
@@ -177,4 +187,5 @@ def _initial_file(workspace: Workspace, view: View, kind: str) -> MapFiles:
         image_path=workspace.image_path(view.name),
         depth_path=map_path(workspace, view.name, kind),
         normal_path=original_map_path(workspace.normal_map_path(view.name, kind)),
+        masks=workspace.masks,
     )

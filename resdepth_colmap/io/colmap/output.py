@@ -71,6 +71,7 @@ class OutputWorkspace:
             sparse_path=self.path / "sparse",
             images_path=self.path / "images",
             stereo_path=self.path / "stereo",
+            masks=self.source.masks,
         )
 
     def depth_map_path(self, name: str) -> Path:

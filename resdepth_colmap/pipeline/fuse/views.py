@@ -14,8 +14,10 @@ from resdepth_colmap.geometry.normals import normals_from_depth
 from resdepth_colmap.geometry.pixels import index_K
 from resdepth_colmap.geometry.resize import area_resized
 from resdepth_colmap.io.colmap.depth_map import read_depth_map
+from resdepth_colmap.io.colmap.masks import Masks
 from resdepth_colmap.io.colmap.normal_map import read_normal_map
 from resdepth_colmap.io.images import read_rgb
+from resdepth_colmap.pipeline.masks import masked_depth
 from resdepth_colmap.scene import (
     ColorImage,
     DepthMap,
@@ -76,6 +78,7 @@ class MapFiles:
         depth_scale: What its depths are multiplied with.
         normal_path: Its normal map; None, or no file there = computed from the depth.
         confidence_path: Its confidence; None, or no file there = 1 everywhere.
+        masks: Those of the images: where the view's mask is 0, there is no depth.
     """
 
     view: View
@@ -84,6 +87,18 @@ class MapFiles:
     depth_scale: float = 1.0
     normal_path: Path | None = None
     confidence_path: Path | None = None
+    masks: Masks = Masks()  # noqa: RUF009 (it is frozen)
+
+    def read_depth(self) -> DepthMap:
+        """Read the depth map, scaled, with 0 where the mask is 0.
+
+        Raises:
+            WorkspaceError: If a file is broken, or the mask of another shape.
+        """
+        depth = read_depth_map(self.depth_path)
+        if self.depth_scale != 1.0:
+            depth = np.float32(self.depth_scale) * depth
+        return masked_depth(self.masks, self.view.name, depth)
 
     def read(self) -> FuseView:
         """Read them all.
@@ -91,9 +106,7 @@ class MapFiles:
         Raises:
             WorkspaceError: If a file is broken, or two maps differ in size.
         """
-        depth = read_depth_map(self.depth_path)
-        if self.depth_scale != 1.0:
-            depth = np.float32(self.depth_scale) * depth
+        depth = self.read_depth()
         height_px, width_px = depth.shape
         K = index_K(self.view.camera.resized(width_px, height_px))
         return FuseView(
