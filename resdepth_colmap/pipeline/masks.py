@@ -14,7 +14,11 @@ import numpy as np
 from resdepth_colmap.config import MaskConfig
 from resdepth_colmap.geometry.resize import nearest_resized
 from resdepth_colmap.io.colmap.masks import Masks, check_masks, find_mask_folder
-from resdepth_colmap.io.colmap.output import OutputWorkspace, read_record
+from resdepth_colmap.io.colmap.output import (
+    BACKDROP_FOLDER,
+    OutputWorkspace,
+    read_record,
+)
 from resdepth_colmap.io.colmap.workspace import Workspace
 from resdepth_colmap.pipeline.manifest import Manifest
 from resdepth_colmap.scene import DepthMap, Scene, Wanted
@@ -148,6 +152,8 @@ def _recorded(workspace: Workspace, after_run: bool) -> MaskConfig | None:
     for facts in _noted(workspace, record):
         folder, alpha = facts.get("folder"), facts.get("alpha") is True
         path = workspace.path / folder if isinstance(folder, str) else None
+        if path is not None and path.name == BACKDROP_FOLDER and not path.is_dir():
+            continue  # the output was deleted; `refine` makes them again
         if path is not None or alpha:
             return MaskConfig(mask_path=path, alpha_masks=alpha)
     return None

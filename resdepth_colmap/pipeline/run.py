@@ -10,16 +10,19 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from resdepth_colmap.config import Fuser
+from resdepth_colmap.config import Fuser, MaskConfig
 from resdepth_colmap.errors import FusionError
+from resdepth_colmap.io.colmap.masks import Masks
 from resdepth_colmap.io.colmap.model import read_scene
 from resdepth_colmap.io.colmap.output import (
+    BACKDROP_FOLDER,
     OVERVIEW_NAME,
     OutputWorkspace,
     read_record,
     write_record,
 )
 from resdepth_colmap.io.colmap.workspace import check_images, open_workspace
+from resdepth_colmap.pipeline.backdrop import backdrop_masks
 from resdepth_colmap.pipeline.fuse.to_file import Clouds, cloud_path
 from resdepth_colmap.pipeline.masks import mask_facts, with_masks
 from resdepth_colmap.pipeline.refine.stage import (
@@ -90,8 +93,22 @@ def run_refine(
     network = load_network(config.refine)
     output = OutputWorkspace(source=workspace, in_place=config.in_place)
     output.prepare([view.name for view in scene.views])
+    output = _without_backdrop(output, scene, config)
     run = _Run(scene, config, output, network, progress or SilentProgress())
     return run.run()
+
+
+def _without_backdrop(
+    output: OutputWorkspace, scene: Scene, config: RunConfig
+) -> OutputWorkspace:
+    """Masks of a uniform backdrop, where the user has given none."""
+    workspace = output.source
+    is_free = workspace.masks.folder in (None, output.path / BACKDROP_FOLDER)
+    if config.masks != MaskConfig() or workspace.masks.alpha_folder or not is_free:
+        return output
+    masks = Masks(folder=backdrop_masks(output, scene))
+    workspace = dataclasses.replace(workspace, masks=masks)
+    return dataclasses.replace(output, source=workspace)
 
 
 class _Run:

@@ -30,6 +30,9 @@ from resdepth_colmap.scene import DepthMap, FloatMap, NormalMap
 KIND = "geometric"
 """Refined maps are called so, because COLMAP's fusion takes this kind by default."""
 
+BACKDROP_FOLDER = "backdrop_masks"
+"""In the output: masks of a uniform backdrop; they are made again where they lack."""
+
 OVERVIEW_NAME = "overview.png"
 """The picture of the whole workspace, in its output."""
 
