@@ -103,7 +103,7 @@ def _heights_px(row: Sequence[Panel]) -> list[int]:
     """Heights of caption, picture, gap, bar and text of the bar in a row."""
     height_px = max(panel.picture.shape[0] for panel in row)
     has_bar = any(panel.scale for panel in row)
-    bar_px = [_BAR_PX, _BAR_TEXT_PX] if has_bar else [0, 0]
+    bar_px = [_BAR_PX, _BAR_TEXT_PX] if has_bar else [0, _GAP_PX]
     return [_CAPTION_PX, height_px, _BAR_GAP_PX, *bar_px]
 
 
