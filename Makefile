@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: help demo test test-fast browser check lint types floors fix bench clean
+.PHONY: help demo test test-fast browser check lint types floors fix bench cases clean
 
 help:  ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -68,6 +68,9 @@ bench: $(READY)  ## measure what docs/benchmarks.md reports; takes hours
 	$(BENCH).cloud
 	$(BENCH).commands
 	$(BENCH).make_tables
+
+cases: $(READY)  ## run the failing cases of real users, where they are at hand
+	$(BENCH).cases
 
 clean:
 	rm -rf $(VENV) demo

@@ -9,7 +9,12 @@ import zlib as _zlib  # noqa: F401  pycolmap before zlib corrupts it: see io/png
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from resdepth_colmap.config import FuseConfig, RefineConfig, StereoConfig
+    from resdepth_colmap.config import (
+        FuseConfig,
+        MaskConfig,
+        RefineConfig,
+        StereoConfig,
+    )
     from resdepth_colmap.errors import ResDepthError
     from resdepth_colmap.io.colmap.workspace import Workspace, open_workspace
     from resdepth_colmap.network.weights import load_weights
@@ -27,6 +32,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Camera",
     "FuseConfig",
+    "MaskConfig",
     "RefineConfig",
     "ResDepthError",
     "RunConfig",
@@ -49,6 +55,7 @@ __all__ = [
 _MODULE_OF = {
     "Camera": "scene",
     "FuseConfig": "config",
+    "MaskConfig": "config",
     "RefineConfig": "config",
     "ResDepthError": "errors",
     "RunConfig": "pipeline.run_config",

@@ -77,6 +77,33 @@ def _plain(value: Any) -> Any:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
+class MaskConfig(Config):
+    """Where it is written which pixels of the images are to be ignored.
+
+    Attributes:
+        mask_path: Folder of masks, "<image name>.png" or "<image name without its
+            suffix>.png", of the shape of the image; where one is 0, the pixel is
+            ignored. Without it: the folder of the run before, else "masks" beside
+            "images".
+        alpha_masks: Ignore the pixels of an image whose alpha is 0.
+        use_masks: Use masks; without them all pixels count.
+    """
+
+    mask_path: Path | None = None
+    alpha_masks: bool = False
+    use_masks: bool = option("masks", True)
+
+    def __post_init__(self) -> None:
+        """Check that masks are not asked for and refused at once."""
+        asked = self.mask_path is not None or self.alpha_masks
+        self._check(
+            self.use_masks or not asked,
+            "no mask_path and no alpha_masks without masks",
+            "use_masks",
+        )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class StereoConfig(Config):
     """The CPU PatchMatch. Names and meanings are those of COLMAP's options.
 
@@ -104,8 +131,6 @@ class StereoConfig(Config):
         filter_geom_consistency_max_cost: Largest error there and back, in pixels, of a
             source that agrees.
         write_consistency_graph: Write down which sources agree with each pixel, too.
-        mask_path: Folder of masks, "<image name>.png"; where one is 0, there will be no
-            depth.
         cache_size: Memory for images and maps that are needed again, in GB.
         seed: Seed of the random hypotheses.
     """
@@ -127,7 +152,6 @@ class StereoConfig(Config):
     filter_min_num_consistent: int = 2
     filter_geom_consistency_max_cost: float = 1.0
     write_consistency_graph: bool = False
-    mask_path: Path | None = None
     cache_size: float = 0.25
     seed: int = 0
 
@@ -196,6 +220,8 @@ class RefineConfig(Config):
             speak against it, or where it is small beside the network's expected error.
         fit_scale: Rescale depth maps that are not at the scale of the model, by the
             sparse points, instead of refusing them.
+        keep_empty: Leave the pixels empty that have no depth in the initial map (0,
+            negative or not finite), instead of filling them.
         tile_px: Side of a square tile, in pixels.
         overlap_px: Overlap of neighbouring tiles, in pixels.
         device: Where the network runs.
@@ -207,6 +233,7 @@ class RefineConfig(Config):
     outer_iterations: int = option("rounds", 3)
     update_gating: bool = True
     fit_scale: bool = False
+    keep_empty: bool = False
     tile_px: int = 512
     overlap_px: int = 128
     device: Device = Device.AUTO

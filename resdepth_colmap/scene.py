@@ -22,6 +22,9 @@ ColorImage = npt.NDArray[np.uint8]
 UnitColors = npt.NDArray[np.float32]
 """RGB values in 0..1, shape (H, W, 3)."""
 
+Wanted = npt.NDArray[np.bool_]
+"""Whether a pixel is wanted, by the mask of its image, shape (H, W)."""
+
 FloatMap = npt.NDArray[np.float32]
 """Any other value a pixel, shape (H, W)."""
 

@@ -15,7 +15,7 @@ from resdepth_colmap.cli.results import (
     show_failure,
     show_result,
 )
-from resdepth_colmap.config import FuseConfig
+from resdepth_colmap.config import FuseConfig, MaskConfig
 from resdepth_colmap.evaluation.compare.config import FUSE_OPTIONS, CompareConfig
 
 if TYPE_CHECKING:
@@ -56,6 +56,7 @@ if TYPE_CHECKING:
     "--unfiltered", default="", help='The kind of map to compare as "unfiltered".'
 )
 @config_options(FuseConfig, *FUSE_OPTIONS)
+@config_options(MaskConfig)
 @click.option(
     "--in-place", is_flag=True, help="Compare maps that `refine --in-place` has made."
 )
@@ -78,7 +79,8 @@ def compare(
     the others, but the exit code is 1.
     """
     fuse = build_config(FuseConfig, values)
-    config = build_config(CompareConfig, {**values, "fuse": fuse})
+    masks = build_config(MaskConfig, values)
+    config = build_config(CompareConfig, {**values, "fuse": fuse, "masks": masks})
     from resdepth_colmap.cli.log import BarProgress
     from resdepth_colmap.cli.printed_comparison import show_workspaces
     from resdepth_colmap.evaluation.compare.comparison import compare_workspaces

@@ -27,7 +27,7 @@ _IRRELEVANT = (
     *("max_image_size", "min_triangulation_angle", "filter", "filter_min_ncc"),
     *("filter_min_triangulation_angle", "filter_min_num_consistent"),
     *("filter_geom_consistency_max_cost", "write_consistency_graph"),
-    *("mask_path", "cache_size"),
+    "cache_size",
 )
 """Options of StereoConfig that do not change an unfiltered map of full size."""
 

@@ -12,7 +12,7 @@ from resdepth_colmap.cli.options import (
     enum_option,
     workspace_argument,
 )
-from resdepth_colmap.config import FuseConfig
+from resdepth_colmap.config import FuseConfig, MaskConfig
 from resdepth_colmap.pipeline.run_config import CloudFormat, RunConfig
 
 
@@ -23,6 +23,7 @@ from resdepth_colmap.pipeline.run_config import CloudFormat, RunConfig
 )
 @workspace_argument
 @config_options(FuseConfig)
+@config_options(MaskConfig)
 @enum_option(
     "--cloud-format",
     kind=CloudFormat,
@@ -50,6 +51,7 @@ def fuse(
     A cloud that is there is replaced.
     """
     config = build_config(FuseConfig, values)
+    masks = build_config(MaskConfig, values)
     from resdepth_colmap.cli.log import BarProgress
     from resdepth_colmap.cli.printed import show_line
     from resdepth_colmap.pipeline.fuse.to_file import fuse_to_file
@@ -59,6 +61,7 @@ def fuse(
         config,
         output or cloud_format,
         in_place=in_place,
+        masks=masks,
         progress=BarProgress(),
     )
     show_line("cloud", f"{path} ({num_points:,} points)")

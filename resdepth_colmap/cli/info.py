@@ -12,7 +12,7 @@ from resdepth_colmap.cli.options import (
     config_options,
     workspace_argument,
 )
-from resdepth_colmap.config import RefineConfig, StereoConfig
+from resdepth_colmap.config import MaskConfig, RefineConfig, StereoConfig
 
 
 @command(
@@ -22,6 +22,7 @@ from resdepth_colmap.config import RefineConfig, StereoConfig
 )
 @workspace_argument
 @config_options(RefineConfig, "input", "inner_iterations", "outer_iterations")
+@config_options(MaskConfig)
 @config_options(StereoConfig, "max_image_size")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON instead of a table.")
 def info(workspace: Path, as_json: bool, **values: Any) -> None:
@@ -43,6 +44,7 @@ def info(workspace: Path, as_json: bool, **values: Any) -> None:
         scene,
         refine,
         stereo,
+        build_config(MaskConfig, values),
     )
     if as_json:
         click.echo(json.dumps(found.to_mapping(), indent=2, ensure_ascii=False))

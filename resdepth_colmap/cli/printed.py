@@ -87,6 +87,8 @@ def show_inspection(found: "Inspection") -> None:
     show_line("missing images", len(found.missing_images))
     show_line("cameras", found.num_cameras)
     show_line("sparse points", f"{found.num_points:,}" if found.num_points else "none")
+    masks = f"{found.masks} ({found.num_masked} of {found.num_views} images)"
+    show_line("masks", masks if found.masks else "none")
     show_line("cfg files", ", ".join(found.cfg_files) or "none")
     if found.maps:
         rows = [

@@ -16,6 +16,7 @@ from resdepth_colmap.cli.options import (
 )
 from resdepth_colmap.config import (
     FuseConfig,
+    MaskConfig,
     RefineConfig,
     StereoBackend,
     StereoConfig,
@@ -27,6 +28,7 @@ from resdepth_colmap.pipeline.run_config import CloudFormat, RunConfig
     "Refine depth maps, fuse them, show what changed.",
     "refine scene/dense",
     "refine scene/dense --stereo cpu --max-image-size 1000 --passes 2",
+    "refine scene/dense --mask-path scene/masks",
 )
 @workspace_argument
 @enum_option(
@@ -38,6 +40,7 @@ from resdepth_colmap.pipeline.run_config import CloudFormat, RunConfig
     "PatchMatch (needs CUDA), or ours on the CPU; auto takes the first that works.",
 )
 @config_options(RefineConfig)
+@config_options(MaskConfig)
 @config_options(StereoConfig, "max_image_size")
 @config_options(FuseConfig)
 @enum_option(
@@ -72,6 +75,7 @@ def refine(
         ),
         refine=build_config(RefineConfig, values),
         fuse=build_config(FuseConfig, values),
+        masks=build_config(MaskConfig, values),
         **{name: values[name] for name in _RUN_OPTIONS},
     )
     from resdepth_colmap.cli.log import BarProgress

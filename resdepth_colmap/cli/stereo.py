@@ -13,7 +13,7 @@ from resdepth_colmap.cli.options import (
     overwrite_option,
     workspace_argument,
 )
-from resdepth_colmap.config import StereoBackend, StereoConfig
+from resdepth_colmap.config import MaskConfig, StereoBackend, StereoConfig
 
 
 @command(
@@ -31,6 +31,7 @@ from resdepth_colmap.config import StereoBackend, StereoConfig
     text="Whose PatchMatch: COLMAP's (needs CUDA), or ours on the CPU.",
 )
 @config_options(StereoConfig)
+@config_options(MaskConfig)
 @overwrite_option
 def stereo(
     workspace: Path, backend: StereoBackend, overwrite: bool, **values: Any
@@ -44,14 +45,17 @@ def stereo(
     what was interrupted goes on.
     """
     config = build_config(StereoConfig, values)
+    masks = build_config(MaskConfig, values)
     from resdepth_colmap.cli.log import BarProgress
     from resdepth_colmap.io.colmap.model import read_scene
     from resdepth_colmap.io.colmap.workspace import check_images, open_workspace
+    from resdepth_colmap.pipeline.masks import with_masks
     from resdepth_colmap.pipeline.stereo.stage import stereo_workspace
 
     opened = open_workspace(workspace)
     scene = read_scene(opened.sparse_path, opened.images_path, opened.path)
     check_images(opened, scene)
+    opened = with_masks(opened, scene, masks)
     report = stereo_workspace(
         opened, scene, config, backend, overwrite=overwrite, progress=BarProgress()
     )

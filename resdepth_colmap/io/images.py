@@ -43,6 +43,26 @@ def read_rgb(path: Path) -> ColorImage:
     return (read_unit_colors(path) * 255 + 0.5).astype(np.uint8)
 
 
+def has_alpha(path: Path) -> bool:
+    """Whether an image has an alpha channel, without decoding it.
+
+    Raises:
+        WorkspaceError: If the file is not there or no image.
+    """
+    with _open(path) as image:
+        return "A" in image.getbands() or "transparency" in image.info
+
+
+def read_alpha(path: Path) -> npt.NDArray[np.uint8]:
+    """Read the alpha channel of an image, shape (H, W); 255 where it has none.
+
+    Raises:
+        WorkspaceError: If the file is not there or no image.
+    """
+    with _open(path) as image:
+        return np.asarray(image.convert("RGBA").getchannel("A"))
+
+
 def image_size(path: Path) -> tuple[int, int]:
     """Width and height of an image, in pixels; WorkspaceError if it is no image."""
     with _open(path) as image:

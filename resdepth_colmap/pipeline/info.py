@@ -7,9 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from resdepth_colmap.config import RefineConfig, StereoBackend, StereoConfig
+from resdepth_colmap.config import (
+    MaskConfig,
+    RefineConfig,
+    StereoBackend,
+    StereoConfig,
+)
 from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.io.colmap.maps import read_depth_map, read_map_size
+from resdepth_colmap.io.colmap.masks import Masks
 from resdepth_colmap.io.colmap.output import OutputWorkspace
 from resdepth_colmap.io.colmap.workspace import Workspace, missing_images
 from resdepth_colmap.pipeline.initial_map import (
@@ -18,6 +24,12 @@ from resdepth_colmap.pipeline.initial_map import (
     map_path,
 )
 from resdepth_colmap.pipeline.manifest import Manifest
+from resdepth_colmap.pipeline.masks import (
+    find_masks,
+    said_masks,
+    said_unmasked,
+    unmasked_images,
+)
 from resdepth_colmap.pipeline.refine.plan import STAGE as REFINE_STAGE
 from resdepth_colmap.pipeline.refine.plan import plan_refine
 from resdepth_colmap.pipeline.run_config import UNFILTERED
@@ -84,6 +96,8 @@ class Inspection:
         maps: The maps there are, by kind.
         missing_images: Images of the model without a file.
         cfg_files: COLMAP's cfg files that are there.
+        masks: Where the masks are; "" = there are none.
+        num_masked: Images that have a mask.
         stereo_backend: Where initial depth would come from.
         num_matched: Images that PatchMatch would match first.
         num_refined: Images that `refine` would refine.
@@ -100,6 +114,8 @@ class Inspection:
     maps: dict[str, MapSummary]
     missing_images: tuple[str, ...]
     cfg_files: tuple[str, ...]
+    masks: str
+    num_masked: int
     stereo_backend: StereoBackend
     num_matched: int
     num_refined: int
@@ -117,6 +133,7 @@ def inspect_workspace(
     scene: Scene,
     refine: RefineConfig | None = None,
     stereo: StereoConfig | None = None,
+    masks: MaskConfig | None = None,
 ) -> Inspection:
     """Look at a workspace; nothing is changed, and a broken map is but a warning.
 
@@ -125,8 +142,13 @@ def inspect_workspace(
         scene: Its model.
         refine: Options of the run to foresee; None = the defaults.
         stereo: Options of its PatchMatch; None = the defaults.
+        masks: Which pixels it would ignore; None = the defaults.
     """
     refine, stereo = refine or RefineConfig(), stereo or UNFILTERED
+    found_masks = find_masks(workspace, masks or MaskConfig())
+    unmasked, wrong_masks = _unmasked(found_masks, scene)
+    if not wrong_masks:
+        workspace = dataclasses.replace(workspace, masks=found_masks)
     maps, broken = _summaries(workspace, scene)
     backend = choose_backend(StereoBackend.AUTO, workspace, scene)
     missing = missing_images(workspace, scene)
@@ -146,6 +168,8 @@ def inspect_workspace(
         maps=maps,
         missing_images=missing,
         cfg_files=tuple(n for n in CFG_NAMES if (workspace.stereo_path / n).is_file()),
+        masks=said_masks(found_masks),
+        num_masked=len(scene.views) - len(unmasked) if found_masks.are_used else 0,
         stereo_backend=backend,
         num_matched=len(matched),
         num_refined=len(refined),
@@ -153,7 +177,16 @@ def inspect_workspace(
         estimate=_estimate(workspace, (matched, refined), backend, refine, stereo),
         warnings=broken,
     )
-    return dataclasses.replace(found, warnings=(*broken, *_warnings(found)))
+    notes = wrong_masks or ([said_unmasked(unmasked)] if unmasked else [])
+    return dataclasses.replace(found, warnings=(*broken, *notes, *_warnings(found)))
+
+
+def _unmasked(masks: Masks, scene: Scene) -> tuple[tuple[str, ...], list[str]]:
+    """Images without a mask, and what is wrong with the masks."""
+    try:
+        return unmasked_images(masks, scene), []
+    except WorkspaceError as error:
+        return tuple(view.name for view in scene.views), [str(error)]
 
 
 def _matched_views(

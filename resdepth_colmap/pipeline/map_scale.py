@@ -25,6 +25,7 @@ from resdepth_colmap.io.colmap.maps import read_depth_map
 from resdepth_colmap.io.colmap.model import read_sparse_points
 from resdepth_colmap.io.colmap.workspace import Workspace
 from resdepth_colmap.pipeline.initial_map import InitialMap
+from resdepth_colmap.pipeline.masks import masked_depth
 from resdepth_colmap.pipeline.refine.photometric_error import photometric_error
 from resdepth_colmap.pipeline.refine.source_sampler import SourceTensors
 from resdepth_colmap.pipeline.view_images import ViewImages, camera_of_size
@@ -108,7 +109,8 @@ def initial_scales(
 ) -> dict[int, ScaleFit]:
     """The scale of each map that is not blank, by the index of its view.
 
-    A view with too few points is left out. Without sparse points all maps get one
+    Only what the masks of the workspace leave counts. A view with too few points is
+    left out. Without sparse points all maps get one
     scale, by what the photographs say; if they say nothing, the result is empty.
 
     Args:
@@ -123,7 +125,8 @@ def initial_scales(
     filled = {index: found for index, found in maps.items() if found.filled}
 
     def read(index: int) -> DepthMap:
-        return read_map(filled[index].path)
+        depth = read_map(filled[index].path)
+        return masked_depth(workspace.masks, scene.views[index].name, depth)
 
     if scene.num_shared_points is None:
         fit = _fit_to_photographs(workspace, scene, sorted(filled), read)

@@ -8,17 +8,17 @@ import numpy as np
 from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.geometry.resize import nearest_resized
 from resdepth_colmap.io.colmap.maps import read_depth_map
-from resdepth_colmap.io.colmap.output import OutputWorkspace
+from resdepth_colmap.io.colmap.output import OVERVIEW_NAME, OutputWorkspace
 from resdepth_colmap.io.files import safe_name
 from resdepth_colmap.io.images import read_rgb, write_png
 from resdepth_colmap.pipeline.initial_map import map_path
+from resdepth_colmap.pipeline.masks import masked_depth
 from resdepth_colmap.pipeline.refine.stage import RefineReport
 from resdepth_colmap.progress import Progress
 from resdepth_colmap.scene import FloatMap, Scene
 from resdepth_colmap.viz.strips import BeforeAfter, depth_strip, overview, thumbnails
 
 FOLDER = "pictures"
-OVERVIEW_NAME = "overview.png"
 MOST_IN_OVERVIEW = 12
 
 
@@ -66,8 +66,10 @@ def evenly_chosen(names: Sequence[str], most: int) -> list[str]:
 def read_before_after(output: OutputWorkspace, name: str, kind: str) -> BeforeAfter:
     """Read photo, initial and refined depth, and ground truth of the maps' size.
 
+    What the mask of the image leaves out is 0 in all of them.
+
     Args:
-        output: Has the refined map; its source the photo and the initial map.
+        output: Has the refined map; its source photo, initial map and masks.
         name: Image name.
         kind: The kind of the initial map.
 
@@ -75,12 +77,14 @@ def read_before_after(output: OutputWorkspace, name: str, kind: str) -> BeforeAf
         WorkspaceError: If a file is missing or broken, or the maps differ in size.
     """
     source, after_path = output.source, output.depth_map_path(name)
-    after = read_depth_map(after_path)
+    after = masked_depth(source.masks, name, read_depth_map(after_path))
     before = read_depth_map(map_path(source, name, kind))
+    before = masked_depth(source.masks, name, before)
     check_equal_size(after_path, after, "the initial map", before)
     path, truth = source.truth_path(name), None
     if path.is_file():
         truth = nearest_resized(read_depth_map(path), after.shape[::-1])
+        truth = masked_depth(source.masks, name, truth)
     rgb = read_rgb(source.image_path(name))
     return BeforeAfter(name=name, rgb=rgb, before=before, after=after, truth=truth)
 

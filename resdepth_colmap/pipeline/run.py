@@ -3,18 +3,28 @@
 import contextlib
 import dataclasses
 import datetime
+import json
 import logging
 import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from resdepth_colmap.config import Fuser
+from resdepth_colmap.config import Fuser, MaskConfig
 from resdepth_colmap.errors import FusionError
+from resdepth_colmap.io.colmap.masks import Masks
 from resdepth_colmap.io.colmap.model import read_scene
-from resdepth_colmap.io.colmap.output import OutputWorkspace, read_record, write_record
+from resdepth_colmap.io.colmap.output import (
+    BACKDROP_FOLDER,
+    OVERVIEW_NAME,
+    OutputWorkspace,
+    read_record,
+    write_record,
+)
 from resdepth_colmap.io.colmap.workspace import check_images, open_workspace
+from resdepth_colmap.pipeline.backdrop import backdrop_masks
 from resdepth_colmap.pipeline.fuse.to_file import Clouds, cloud_path
+from resdepth_colmap.pipeline.masks import mask_facts, with_masks
 from resdepth_colmap.pipeline.refine.stage import (
     Network,
     RefineReport,
@@ -43,6 +53,7 @@ class RunResult:
             None if nobody counted them.
         overview_path: The picture of the whole workspace; None without pictures.
         report_path: The page that shows all of it; None as long as nobody wrote it.
+        is_idle: Whether there was nothing to do.
     """
 
     stereo: StereoReport
@@ -52,6 +63,7 @@ class RunResult:
     num_points_before: int | None = None
     overview_path: Path | None = None
     report_path: Path | None = None
+    is_idle: bool = False
 
 
 def run_refine(
@@ -77,11 +89,26 @@ def run_refine(
     workspace = open_workspace(path)
     scene = read_scene(workspace.sparse_path, workspace.images_path, workspace.path)
     check_images(workspace, scene)
+    workspace = with_masks(workspace, scene, config.masks)
     network = load_network(config.refine)
     output = OutputWorkspace(source=workspace, in_place=config.in_place)
     output.prepare([view.name for view in scene.views])
+    output = _without_backdrop(output, scene, config)
     run = _Run(scene, config, output, network, progress or SilentProgress())
     return run.run()
+
+
+def _without_backdrop(
+    output: OutputWorkspace, scene: Scene, config: RunConfig
+) -> OutputWorkspace:
+    """Masks of a uniform backdrop, where the user has given none."""
+    workspace = output.source
+    is_free = workspace.masks.folder in (None, output.path / BACKDROP_FOLDER)
+    if config.masks != MaskConfig() or workspace.masks.alpha_folder or not is_free:
+        return output
+    masks = Masks(folder=backdrop_masks(output, scene))
+    workspace = dataclasses.replace(workspace, masks=masks)
+    return dataclasses.replace(output, source=workspace)
 
 
 class _Run:
@@ -103,6 +130,7 @@ class _Run:
         self.progress = progress
         self.seconds: dict[str, float] = {}
         self.facts: dict[str, Any] = {}
+        self.has_fused = False
 
     def run(self) -> RunResult:
         result = RunResult(stereo=self._stereo(), refine=self._refine())
@@ -113,9 +141,12 @@ class _Run:
             except FusionError as error:  # the maps are good: go on, then say it
                 failure = error
                 self.facts["fuse"] = {"error": str(error)}
+        is_idle = failure is None and self._is_idle(result)
         if not self.config.no_pictures:
-            result = self._draw(result)
-        self._write_record(result)
+            result = self._draw(result, is_idle)
+        if not is_idle:  # else the record of the run that made it all stays
+            self._write_record(result)
+        result = dataclasses.replace(result, is_idle=is_idle)
         if failure is not None:
             raise failure
         return result
@@ -154,6 +185,7 @@ class _Run:
                 before = clouds.initial(result.refine.images, overwrite)
             self.facts["fuse_before"] = before
             num_before = before["num_points"]
+        self.has_fused = clouds.num_made > 0
         self.facts["fuse"] = {**fused, "points_before_refinement": num_before}
         return dataclasses.replace(
             result,
@@ -162,7 +194,20 @@ class _Run:
             num_points_before=num_before,
         )
 
-    def _draw(self, result: RunResult) -> RunResult:
+    def _is_idle(self, result: RunResult) -> bool:
+        """Whether all of it was made by an earlier run with the same options."""
+        options = json.loads(json.dumps(self.config.to_mapping(), default=str))
+        return not (
+            result.stereo.matched
+            or result.refine.refined
+            or self.has_fused
+            or read_record(self.output.record_path).get("options") != options
+        )
+
+    def _draw(self, result: RunResult, is_idle: bool) -> RunResult:
+        path = self.output.path / OVERVIEW_NAME
+        if is_idle and path.is_file():
+            return dataclasses.replace(result, overview_path=path)
         from resdepth_colmap.pipeline.pictures import draw_workspace  # fonts: slow
 
         with self._timed("pictures"):
@@ -189,6 +234,7 @@ class _Run:
             "refined": refine.refined,
             "kept": refine.kept,
             "skipped": dict(refine.skipped),
+            "masks": mask_facts(self.workspace),
             **self.facts,
         }
         path = self.output.record_path

@@ -6,6 +6,7 @@ from typing import Any
 
 from resdepth_colmap.config import (
     FuseConfig,
+    MaskConfig,
     RefineConfig,
     StereoBackend,
     StereoConfig,
@@ -33,6 +34,7 @@ class RunConfig:
             for a doubtful depth than for a hole.
         refine: Options of the refinement.
         fuse: Options of the fusion.
+        masks: Which pixels of the images are ignored.
         no_fuse: Leave out the cloud.
         no_pictures: Leave out the pictures.
         cloud_format: File format of the cloud.
@@ -45,6 +47,7 @@ class RunConfig:
     stereo: StereoConfig = UNFILTERED
     refine: RefineConfig = dataclasses.field(default_factory=RefineConfig)
     fuse: FuseConfig = dataclasses.field(default_factory=FuseConfig)
+    masks: MaskConfig = dataclasses.field(default_factory=MaskConfig)
     no_fuse: bool = False
     no_pictures: bool = False
     cloud_format: CloudFormat = CloudFormat.PLY
@@ -53,7 +56,8 @@ class RunConfig:
 
     def to_mapping(self) -> dict[str, Any]:
         """Plain values only, ready for JSON."""
-        stages = {name: getattr(self, name) for name in ("stereo", "refine", "fuse")}
+        names = ("stereo", "refine", "fuse", "masks")
+        stages = {name: getattr(self, name) for name in names}
         plain = {name: config.to_mapping() for name, config in stages.items()}
         return {
             **vars(self),

@@ -1,7 +1,5 @@
 """Images and depth maps at the size that is matched at, the last few of them kept."""
 
-import collections
-from collections.abc import Callable, Hashable
 from pathlib import Path
 
 import numpy as np
@@ -10,55 +8,18 @@ from resdepth_colmap.geometry.resize import area_resized, nearest_resized
 from resdepth_colmap.io.colmap.maps import read_depth_map
 from resdepth_colmap.io.colmap.workspace import Workspace, original_map_path
 from resdepth_colmap.io.images import read_gray, read_unit_colors
+from resdepth_colmap.pipeline.masks import wanted_pixels
+from resdepth_colmap.pipeline.recent_cache import RecentCache
 from resdepth_colmap.scene import (
     Camera,
     DepthMap,
-    FloatMap,
     GrayImage,
     UnitColors,
     View,
+    Wanted,
 )
 
 Size = tuple[int, int]
-
-
-class ArrayCache:
-    """Keeps the arrays that were asked for last; memory holds so many bytes of them.
-
-    Attributes:
-        max_num_bytes: An array is forgotten when there are more.
-    """
-
-    def __init__(self, max_num_bytes: int) -> None:
-        """Keep nothing yet."""
-        self.max_num_bytes = max_num_bytes
-        self._kept: collections.OrderedDict[Hashable, FloatMap] = (
-            collections.OrderedDict()
-        )
-
-    @property
-    def num_bytes(self) -> int:
-        """Memory of what is kept."""
-        return sum(array.nbytes for array in self._kept.values())
-
-    def get(self, key: Hashable, load: Callable[[], FloatMap]) -> FloatMap:
-        """What is kept under that key; else what `load` returns, and it is kept."""
-        if key not in self._kept:
-            array = load()
-            self._forget(array.nbytes)
-            if array.nbytes > self.max_num_bytes:
-                return array
-            self._kept[key] = array
-        self._kept.move_to_end(key)
-        return self._kept[key]
-
-    def drop(self, key: Hashable) -> None:
-        """Forget an array: its file has changed."""
-        self._kept.pop(key, None)
-
-    def _forget(self, num_more: int) -> None:
-        while self._kept and self.num_bytes + num_more > self.max_num_bytes:
-            self._kept.popitem(last=False)
 
 
 class ViewImages:
@@ -72,7 +33,7 @@ class ViewImages:
     def __init__(self, workspace: Workspace, max_num_bytes: int) -> None:
         """Keep nothing yet, and up to that many bytes later."""
         self.workspace = workspace
-        self.cache = ArrayCache(max_num_bytes)
+        self.cache = RecentCache(max_num_bytes)
 
     def gray(self, view: View, camera: Camera) -> GrayImage:
         """Grey values of a view in 0..1, at the size of `camera`, float32.
@@ -106,6 +67,23 @@ class ViewImages:
         size = (camera.width_px, camera.height_px)
         key = (view.name, size, kind)
         return self.cache.get(key, lambda: self._load_depth(view, size, kind))
+
+    def wanted(self, view: View, camera: Camera) -> Wanted | None:
+        """The mask of a view at the size of `camera`; None = all pixels are wanted.
+
+        Raises:
+            WorkspaceError: If the mask cannot be read, or is of another shape.
+        """
+        masks = self.workspace.masks
+        if not masks.files(view.name):
+            return None
+        size = (camera.width_px, camera.height_px)
+
+        def load() -> Wanted:
+            wanted = wanted_pixels(masks, view.name, size)
+            return np.ones(size[::-1], np.bool_) if wanted is None else wanted
+
+        return self.cache.get((view.name, size, "mask"), load)
 
     def whole_map(self, path: Path) -> DepthMap:
         """The depth map of a file, as it was before any run in place; 0 = no depth.

@@ -32,7 +32,7 @@ def image_facts(maps: ImageMaps, record: Record) -> dict[str, Any]:
         "height": height_px,
         "scale": {"least": scale.least, "most": scale.most, "ticks": scale.ticks()},
         "limit": difference_limit(change),
-        "filled": [_share(maps.before > 0), _share(maps.after > 0)],
+        "filled": [float((it > 0).mean()) for it in (maps.before, maps.after)],
         "change": float(np.median(size)) if size.size else None,
         "input": str(record.get("input", "")),
         "sources": _sources(record),
@@ -144,7 +144,3 @@ def _mean(records: Sequence[Record], key: str) -> float | None:
 def _number(value: Any) -> float | int | None:
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
     return value if is_number and math.isfinite(value) else None
-
-
-def _share(flags: Any) -> float:
-    return float(np.mean(flags))

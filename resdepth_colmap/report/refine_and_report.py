@@ -10,7 +10,7 @@ from resdepth_colmap.io.colmap.workspace import open_workspace
 from resdepth_colmap.pipeline.run import RunResult, run_refine
 from resdepth_colmap.pipeline.run_config import RunConfig
 from resdepth_colmap.progress import Progress
-from resdepth_colmap.report.write_report import write_report
+from resdepth_colmap.report.write_report import REPORT_NAME, write_report
 
 
 def refine_and_report(
@@ -31,7 +31,9 @@ def refine_and_report(
     except FusionError:  # maps and record exist
         _report(path, progress)
         raise
-    report_path = _report(path, progress)
+    report_path = result.refine.output.path / REPORT_NAME
+    if not (result.is_idle and report_path.is_file()):
+        report_path = _report(path, progress)
     return dataclasses.replace(result, report_path=report_path)
 
 

@@ -4,6 +4,7 @@ import logging
 from pathlib import Path
 from typing import Any
 
+from resdepth_colmap.config import MaskConfig
 from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.io.colmap.model import read_scene
 from resdepth_colmap.io.colmap.output import OutputWorkspace, read_record
@@ -11,6 +12,7 @@ from resdepth_colmap.io.colmap.workspace import open_workspace
 from resdepth_colmap.io.files import write_whole
 from resdepth_colmap.io.point_cloud import read_cloud
 from resdepth_colmap.pipeline.fuse.to_file import cloud_before_path, cloud_path
+from resdepth_colmap.pipeline.masks import with_masks
 from resdepth_colmap.pipeline.pictures import evenly_chosen
 from resdepth_colmap.progress import Progress, SilentProgress
 from resdepth_colmap.report.content import (
@@ -38,7 +40,9 @@ logger = logging.getLogger(__name__)
 REPORT_NAME = "report.html"
 
 
-def write_report(path: Path, progress: Progress | None = None) -> Path:
+def write_report(
+    path: Path, progress: Progress | None = None, masks: MaskConfig | None = None
+) -> Path:
     """Write the report of a refined workspace.
 
     An image with missing or mismatched maps is left out, and the page gives the reason.
@@ -46,6 +50,8 @@ def write_report(path: Path, progress: Progress | None = None) -> Path:
     Args:
         path: The workspace, or a parent of it.
         progress: Reports the progress.
+        masks: What to leave out of the maps; None = what the refinement has left out.
+            The cloud is shown as it is.
 
     Returns:
         The page, `resdepth/report.html`.
@@ -56,6 +62,7 @@ def write_report(path: Path, progress: Progress | None = None) -> Path:
     """
     workspace = open_workspace(path)
     scene = read_scene(workspace.sparse_path, workspace.images_path, workspace.path)
+    workspace = with_masks(workspace, scene, masks or MaskConfig(), after_run=True)
     record = read_record(OutputWorkspace(source=workspace).record_path)
     options = record.get("options")
     in_place = isinstance(options, dict) and options.get("in_place") is True

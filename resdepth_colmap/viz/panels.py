@@ -61,7 +61,9 @@ def draw_panels(
     heights_px = [_HEAD_PX]
     for start in range(0, len(panels), num_columns):
         in_row = panels[start : start + num_columns]
-        bar_px = [_BAR_PX, _BAR_TEXT_PX] if any(it.scale for it in in_row) else [0, 0]
+        bar_px = (
+            [_BAR_PX, _BAR_TEXT_PX] if any(it.scale for it in in_row) else [0, _GAP_PX]
+        )
         picture_px = max(panel.picture.shape[0] for panel in in_row)
         heights_px += [_CAPTION_PX, picture_px, _BAR_GAP_PX, *bar_px]
     grid = _pixel_grid([_GAP_PX, *([width_px, _GAP_PX] * num_columns)], heights_px)

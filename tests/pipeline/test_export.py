@@ -63,6 +63,28 @@ def test_png_times_its_unit_is_the_depth(folder: Path, tmp_path: Path) -> None:
     np.testing.assert_allclose(values * unit, depth, atol=0.51 * unit)
 
 
+def test_an_outlier_does_not_take_the_resolution_of_a_png(
+    folder: Path, tmp_path: Path
+) -> None:
+    path = folder / "stereo/depth_maps" / f"{NAMES[1]}.geometric.bin"
+    depth = read_depth_map(path)
+    farthest = max(float(initial(folder, name).max()) for name in NAMES)
+    depth[0, :3] = 1e5
+    write_depth_map(path, depth)
+    output = tmp_path / "out"
+    export_maps(open_workspace(folder), output, MapFormat.PNG16, "geometric")
+    scale = json.loads((output / "depth_scale.json").read_text(encoding="utf-8"))
+    assert scale["unit"] < 2.1 * farthest / 65535
+    num_depths = sum(np.count_nonzero(initial(folder, name)) for name in NAMES)
+    assert scale["clipped"] == pytest.approx(3 / num_depths)
+    values = np.asarray(Image.open(output / f"{NAMES[1]}.png")).astype(np.float64)
+    assert (values[0, :3] == 65535).all()
+    shown = (depth > 0) & (depth < 1e5)
+    np.testing.assert_allclose(
+        (values * scale["unit"])[shown], depth[shown], atol=0.51 * scale["unit"]
+    )
+
+
 def test_refined_maps_are_exported_once_there_are_any(
     folder: Path, tmp_path: Path
 ) -> None:

@@ -1,6 +1,7 @@
 """How often a run opens its files: each map once a view, iteration and role."""
 
 import collections
+import dataclasses
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -9,7 +10,7 @@ import pytest
 from planes import NAMES
 from workspaces import identity_weights, plane_folder
 
-from resdepth_colmap.config import RefineConfig
+from resdepth_colmap.config import FuseConfig, RefineConfig
 from resdepth_colmap.io.colmap.output import OutputWorkspace
 from resdepth_colmap.io.colmap.workspace import open_workspace
 from resdepth_colmap.network.weights import load_weights
@@ -18,6 +19,7 @@ from resdepth_colmap.pipeline.refine.cross_view import NUM_SOURCE_MAPS
 from resdepth_colmap.pipeline.refine.stage import refine_workspace
 from resdepth_colmap.pipeline.run import run_refine
 from resdepth_colmap.pipeline.run_config import RunConfig
+from resdepth_colmap.report.refine_and_report import refine_and_report
 
 _opened: collections.Counter[str] | None = None
 
@@ -81,6 +83,21 @@ def test_what_is_fresh_is_not_read_again(
     assert refine_workspace(open_workspace(folder), options).refined == ()
     assert num_map_reads(opened) == 0
     assert not [path for path in opened if "/images/" in path]
+
+
+def test_a_run_with_nothing_to_do_leaves_all_as_it_is(tmp_path: Path) -> None:
+    folder = plane_folder(tmp_path)
+    options = RunConfig(refine=config(tmp_path))
+    assert not refine_and_report(folder, options).is_idle
+    files = [path for path in folder.rglob("*") if path.is_file()]
+    before = {path: (path.read_bytes(), path.stat().st_mtime_ns) for path in files}
+    again = refine_and_report(folder, options)
+    assert again.is_idle and again.num_points > 0
+    after = {path: (path.read_bytes(), path.stat().st_mtime_ns) for path in files}
+    changed = [path.name for path in files if before[path] != after[path]]
+    assert changed == []
+    fewer = dataclasses.replace(options, fuse=FuseConfig(min_num_views=2))
+    assert not refine_and_report(folder, fewer).is_idle
 
 
 def test_a_run_loads_its_network_and_prepares_its_output_once(

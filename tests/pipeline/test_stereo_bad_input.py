@@ -173,7 +173,7 @@ def test_masks_that_do_not_fit_are_one_line(tmp_path: Path) -> None:
     folder, masks = plane_folder(tmp_path, kinds=()), tmp_path / "masks"
     assert "no such folder of masks" in one_line(folder, "--mask-path", str(masks))
     (masks / NAMES[0]).parent.mkdir(parents=True)
-    Image.fromarray(np.zeros((30, 40), np.uint8)).save(masks / f"{NAMES[0]}.png")
-    assert "40 x 30 pixels, but its image 80 x 60" in one_line(
+    Image.fromarray(np.zeros((40, 40), np.uint8)).save(masks / f"{NAMES[0]}.png")
+    assert "40 x 40 pixels, but its image 80 x 60" in one_line(
         folder, "--mask-path", str(masks)
     )

@@ -10,12 +10,13 @@ from PIL import Image
 from planes import NAMES
 from workspaces import plane_folder
 
-from resdepth_colmap.config import StereoBackend, StereoConfig
+from resdepth_colmap.config import MaskConfig, StereoBackend, StereoConfig
 from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.io.colmap.cfg import read_sources
 from resdepth_colmap.io.colmap.maps import read_depth_map, read_normal_map
 from resdepth_colmap.io.colmap.model import read_image_indices, read_scene
 from resdepth_colmap.io.colmap.workspace import Workspace, open_workspace
+from resdepth_colmap.pipeline.masks import with_masks
 from resdepth_colmap.pipeline.stereo.stage import StereoReport, stereo_workspace
 from resdepth_colmap.scene import Scene
 
@@ -34,8 +35,11 @@ def opened(folder: Path) -> tuple[Workspace, Scene]:
 def match(
     folder: Path, backend: StereoBackend = StereoBackend.CPU, **options: object
 ) -> StereoReport:
+    workspace, scene = opened(folder)
+    masks = MaskConfig(mask_path=options.pop("mask_path", None))  # type: ignore[arg-type]
     config = StereoConfig(**options)  # type: ignore[arg-type] # passed on
-    return stereo_workspace(*opened(folder), config, backend)
+    workspace = with_masks(workspace, scene, masks)
+    return stereo_workspace(workspace, scene, config, backend)
 
 
 def write_mask(folder: Path, name: str, value: int = 0) -> None:
@@ -86,13 +90,13 @@ def test_a_wholly_black_mask_leaves_a_map_without_depth(
     assert match(folder, mask_path=masks).matched == ()
 
 
-def test_a_mask_of_another_size_stops_all_before_it_begins(
+def test_a_mask_of_another_shape_stops_all_before_it_begins(
     tmp_path: Path, matcher: FakeMatcher
 ) -> None:
     folder, masks = plane_folder(tmp_path, kinds=()), tmp_path / "masks"
     (masks / NAMES[0]).parent.mkdir(parents=True)
-    Image.fromarray(np.zeros((30, 40), np.uint8)).save(masks / f"{NAMES[0]}.png")
-    with pytest.raises(WorkspaceError, match=r"0\.png\.png.* 40 x 30 .* 80 x 60"):
+    Image.fromarray(np.zeros((40, 40), np.uint8)).save(masks / f"{NAMES[0]}.png")
+    with pytest.raises(WorkspaceError, match=r"0\.png\.png.* 40 x 40 .* 80 x 60"):
         match(folder, mask_path=masks)
     assert not matcher.calls
 

@@ -39,6 +39,7 @@ from resdepth_colmap.evaluation.plain import finite_mean, plain
 from resdepth_colmap.io.colmap.model import read_scene, read_sparse_points
 from resdepth_colmap.io.colmap.output import OutputWorkspace
 from resdepth_colmap.io.colmap.workspace import check_images, open_workspace
+from resdepth_colmap.pipeline.masks import with_masks
 from resdepth_colmap.pipeline.view_images import ViewImages
 from resdepth_colmap.progress import Progress, SilentProgress
 from resdepth_colmap.scene import Scene
@@ -120,6 +121,7 @@ def _compared(
     start = time.perf_counter()
     workspace = open_workspace(path)
     scene = read_scene(workspace.sparse_path, workspace.images_path, workspace.path)
+    workspace = with_masks(workspace, scene, config.masks, after_run=True)
     output = OutputWorkspace(source=workspace, in_place=in_place)
     methods, notes = find_methods(output, scene, config)
     compared = tuple(file.view for file in methods[0].files)

@@ -3,7 +3,7 @@
 import dataclasses
 from typing import Any
 
-from resdepth_colmap.config import Config, FuseConfig
+from resdepth_colmap.config import Config, FuseConfig, MaskConfig
 from resdepth_colmap.evaluation.cloud.config import is_increasing
 
 FUSE_OPTIONS = (
@@ -29,12 +29,14 @@ class CompareConfig(Config):
             increasing; () = 1 % and 2 % of the mean true depth.
         fuse: Thresholds of both fusions; `fuser`, `voxel_size` and `remove_outliers`
             are ignored. Depth below its `min_confidence` counts as none.
+        masks: Which pixels are left out of all methods.
     """
 
     unfiltered: str = ""
     filtered: str = ""
     tolerances: tuple[float, ...] = ()
     fuse: FuseConfig = dataclasses.field(default_factory=FuseConfig)
+    masks: MaskConfig = dataclasses.field(default_factory=MaskConfig)
 
     def __post_init__(self) -> None:
         """Check the values."""
@@ -51,4 +53,9 @@ class CompareConfig(Config):
     def to_mapping(self) -> dict[str, Any]:
         """Plain values, ready for JSON."""
         fuse = {name: getattr(self.fuse, name) for name in FUSE_OPTIONS}
-        return {**vars(self), "tolerances": list(self.tolerances), "fuse": fuse}
+        return {
+            **vars(self),
+            "tolerances": list(self.tolerances),
+            "fuse": fuse,
+            "masks": self.masks.to_mapping(),
+        }

@@ -11,14 +11,15 @@ from resdepth_colmap.evaluation.compare.config import CompareConfig
 from resdepth_colmap.evaluation.metrics.view_maps import ViewMaps
 from resdepth_colmap.geometry.pixels import index_K
 from resdepth_colmap.geometry.resize import nearest_resized
-from resdepth_colmap.io.colmap.maps import read_depth_map
+from resdepth_colmap.io.colmap.maps import read_depth_map, read_map_size
 from resdepth_colmap.io.colmap.output import OutputWorkspace
 from resdepth_colmap.io.colmap.workspace import Workspace, original_map_path
 from resdepth_colmap.pipeline.fuse.stage import refined_files
 from resdepth_colmap.pipeline.fuse.views import MapFiles
 from resdepth_colmap.pipeline.initial_map import choose_initial_map, map_path
+from resdepth_colmap.pipeline.masks import wanted_pixels
+from resdepth_colmap.pipeline.recent_cache import RecentCache
 from resdepth_colmap.pipeline.refine.cross_view import FILTERED_SHARE
-from resdepth_colmap.pipeline.view_images import ArrayCache
 from resdepth_colmap.scene import DepthMap, Scene, View
 
 METHODS = ("filtered", "unfiltered", "refined")
@@ -114,12 +115,18 @@ def find_methods(
 def _filled_shares(
     workspace: Workspace, views: Sequence[View], kinds: Mapping[str, Sequence[str]]
 ) -> dict[str, float]:
-    """Mean share of pixels with a depth, by kind."""
+    """Mean share of pixels with a depth, of those that are wanted, by kind."""
     shares: dict[str, list[float]] = {}
     for view in views:
         for kind in kinds[view.name]:
             found = choose_initial_map(workspace, view.name, view.camera, [kind])
-            shares.setdefault(kind, []).append(found.filled)
+            share = found.filled
+            size_px = read_map_size(found.path)
+            wanted = wanted_pixels(workspace.masks, view.name, size_px)
+            if wanted is not None:
+                depth = read_depth_map(found.path)[wanted]
+                share = float(np.count_nonzero(depth) / max(1, depth.size))
+            shares.setdefault(kind, []).append(share)
     return {kind: sum(values) / len(values) for kind, values in shares.items()}
 
 
@@ -152,6 +159,7 @@ def _initial_file(workspace: Workspace, view: View, kind: str) -> MapFiles:
         image_path=workspace.image_path(view.name),
         depth_path=map_path(workspace, view.name, kind),
         normal_path=original_map_path(workspace.normal_map_path(view.name, kind)),
+        masks=workspace.masks,
     )
 
 
@@ -166,7 +174,7 @@ class MethodMaps(Sequence[ViewMaps]):
         """Read nothing yet; depth below that confidence counts as none."""
         self._methods = methods
         self._min_confidence = min_confidence
-        self._cache = ArrayCache(MAX_NUM_BYTES)
+        self._cache = RecentCache(MAX_NUM_BYTES)
 
     def __len__(self) -> int:
         """The number of views."""
@@ -195,7 +203,7 @@ def confident_depth(file: MapFiles, min_confidence: float) -> DepthMap:
 
     Without a confidence map, all depth is kept. WorkspaceError if a map is broken.
     """
-    depth = read_depth_map(file.depth_path)
+    depth = file.read_depth()
     path = file.confidence_path
     if min_confidence > 0 and path is not None and path.is_file():
         depth = np.where(read_depth_map(path) >= min_confidence, depth, np.float32(0))

@@ -118,7 +118,9 @@ def _lines(path: Path) -> Iterator[tuple[int, str]]:
 def _write_lines(path: Path, lines: list[str]) -> None:
     for line in lines:
         _check_name(path, line, forbidden="\n")
-    write_whole(path, "".join(f"{line}\n" for line in lines).encode("utf-8"))
+    data = "".join(f"{line}\n" for line in lines).encode("utf-8")
+    if not (path.is_file() and path.read_bytes() == data):
+        write_whole(path, data)
 
 
 def _check_name(path: Path, name: str, forbidden: str) -> None:

@@ -49,7 +49,7 @@ def write_depth_map(path: Path, depth: DepthMap) -> None:
     if depth.ndim != 2:
         raise ValueError(f"{depth.shape=} but expected (H, W).")
     usable = np.isfinite(depth) & (depth >= 0)
-    _write_planes(path, np.where(usable, depth, np.float32(0))[np.newaxis])
+    write_planes(path, np.where(usable, depth, np.float32(0))[np.newaxis])
 
 
 def read_normal_map(path: Path) -> NormalMap:
@@ -78,7 +78,7 @@ def write_normal_map(path: Path, normals: NormalMap) -> None:
         raise ValueError(f"{normals.shape=} but expected (H, W, 3).")
     finite = np.isfinite(normals).all(axis=2, keepdims=True)
     clean = np.where(finite, normals, np.float32(0))
-    _write_planes(path, np.moveaxis(clean, 2, 0))
+    write_planes(path, np.moveaxis(clean, 2, 0))
 
 
 def write_consistency_graph(
@@ -145,7 +145,8 @@ def read_planes(path: Path, num_channels: int) -> npt.NDArray[np.float32]:
     return values.reshape(channels, height, width).astype(np.float32, copy=False)
 
 
-def _write_planes(path: Path, planes: npt.NDArray[np.floating]) -> None:
+def write_planes(path: Path, planes: npt.NDArray[np.floating]) -> None:
+    """Write a map, shape (C, H, W), as it is; WorkspaceError if that fails."""
     channels, height, width = planes.shape
     header = f"{width}&{height}&{channels}&".encode("ascii")
     write_whole(path, header + planes.astype("<f4").tobytes())

@@ -35,6 +35,12 @@ from resdepth_colmap.scene import DepthMap, FloatMap, NormalMap
 KIND = "geometric"
 """Refined maps are called so, because COLMAP's fusion takes this kind by default."""
 
+BACKDROP_FOLDER = "backdrop_masks"
+"""In the output: masks of a uniform backdrop; they are made again where they lack."""
+
+OVERVIEW_NAME = "overview.png"
+"""The picture of the whole workspace, in its output."""
+
 _MODEL_FILES = frozenset(
     f"{part}{suffix}" for part in MODEL_PARTS for suffix in (".bin", ".txt")
 )
@@ -73,6 +79,7 @@ class OutputWorkspace:
             sparse_path=self.path / "sparse",
             images_path=self.path / "images",
             stereo_path=self.path / "stereo",
+            masks=self.source.masks,
         )
 
     def depth_map_path(self, name: str) -> Path:

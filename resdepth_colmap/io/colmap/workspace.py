@@ -5,6 +5,7 @@ import re
 from pathlib import Path
 
 from resdepth_colmap.errors import WorkspaceError
+from resdepth_colmap.io.colmap.masks import Masks
 from resdepth_colmap.io.colmap.reconstruction import find_model
 from resdepth_colmap.io.files import safe_name
 from resdepth_colmap.io.images import image_size
@@ -29,12 +30,14 @@ class Workspace:
         sparse_path: Folder of the model: `sparse` or `sparse/0` in it.
         images_path: Folder of the undistorted images.
         stereo_path: Folder of the maps and cfg files; it may not exist yet.
+        masks: The masks of the images, once they are looked for (`pipeline.masks`).
     """
 
     path: Path
     sparse_path: Path
     images_path: Path
     stereo_path: Path
+    masks: Masks = Masks()  # noqa: RUF009 (it is frozen)
 
     def image_path(self, name: str) -> Path:
         """The image of that name; WorkspaceError if the name leads out of it."""

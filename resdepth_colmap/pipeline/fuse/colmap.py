@@ -10,15 +10,18 @@ import numpy as np
 
 from resdepth_colmap.config import FuseConfig
 from resdepth_colmap.errors import FusionError
-from resdepth_colmap.io.colmap.maps import read_depth_map
+from resdepth_colmap.io.colmap.maps import read_map_size
 from resdepth_colmap.io.colmap.output import KIND
 from resdepth_colmap.io.colmap.workspace import Workspace
+from resdepth_colmap.io.files import safe_name
+from resdepth_colmap.io.images import write_png
 from resdepth_colmap.io.point_cloud import PointCloud, read_cloud
 from resdepth_colmap.pipeline.fuse.geometric_consistency import (
     Consistent,
     FuseStatistics,
 )
 from resdepth_colmap.pipeline.fuse.views import MapFiles
+from resdepth_colmap.pipeline.masks import wanted_pixels
 from resdepth_colmap.scene import Scene
 
 
@@ -59,10 +62,10 @@ def fuse_with_colmap(
             "--fuser open3d."
         )
     needed = min(config.min_num_views, len(files))
-    cloud = _run(workspace, config, needed)
-    num_pixels = sum(
-        int(np.count_nonzero(read_depth_map(file.depth_path))) for file in files
-    )
+    with tempfile.TemporaryDirectory() as folder:
+        mask_folder = _write_masks(Path(folder), files)
+        cloud = _run(workspace, config, needed, mask_folder)
+    num_pixels = sum(int(np.count_nonzero(file.read_depth())) for file in files)
     return Consistent(
         cloud,
         FuseStatistics(
@@ -74,7 +77,25 @@ def fuse_with_colmap(
     )
 
 
-def _run(workspace: Workspace, config: FuseConfig, min_num_pixels: int) -> PointCloud:
+def _write_masks(folder: Path, files: Sequence[MapFiles]) -> Path | None:
+    """Write the masks as COLMAP does, at the size of the maps; None: there are none."""
+    written = None
+    for file in files:
+        name = file.view.name
+        wanted = wanted_pixels(file.masks, name, read_map_size(file.depth_path))
+        if wanted is not None:
+            gray = np.where(wanted, np.uint8(255), np.uint8(0))
+            write_png(folder / f"{safe_name(name)}.png", np.dstack([gray] * 3))
+            written = folder
+    return written
+
+
+def _run(
+    workspace: Workspace,
+    config: FuseConfig,
+    min_num_pixels: int,
+    mask_folder: Path | None,
+) -> PointCloud:
     import pycolmap
 
     with tempfile.TemporaryDirectory() as folder, _quiet(pycolmap):
@@ -84,7 +105,7 @@ def _run(workspace: Workspace, config: FuseConfig, min_num_pixels: int) -> Point
                 output_path=path,
                 workspace_path=workspace.path,
                 input_type=KIND,
-                options=_options(pycolmap, config, min_num_pixels),
+                options=_options(pycolmap, config, min_num_pixels, mask_folder),
                 output_type="PLY",
             )
         except (ValueError, RuntimeError, IndexError, OSError) as error:
@@ -98,12 +119,16 @@ def _run(workspace: Workspace, config: FuseConfig, min_num_pixels: int) -> Point
         return read_cloud(path)
 
 
-def _options(pycolmap: Any, config: FuseConfig, min_num_pixels: int) -> Any:
+def _options(
+    pycolmap: Any, config: FuseConfig, min_num_pixels: int, mask_folder: Path | None
+) -> Any:
     options = pycolmap.StereoFusionOptions()
     options.min_num_pixels = min_num_pixels
     options.max_depth_error = config.max_depth_error
     options.max_reproj_error = config.max_reproj_error
     options.max_normal_error = config.max_normal_error_deg
+    if mask_folder is not None:
+        options.mask_path = str(mask_folder)
     return options
 
 

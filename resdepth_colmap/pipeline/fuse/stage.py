@@ -63,7 +63,7 @@ def fuse_workspace(
     config: FuseConfig,
     progress: Progress | None = None,
 ) -> Fused:
-    """Fuse the refined maps of a workspace.
+    """Fuse the refined maps of a workspace, without what its masks leave out.
 
     Args:
         output: Where the refined maps are.
@@ -130,6 +130,7 @@ def initial_files(
             image_path=workspace.image_path(view.name),
             depth_path=map_path(workspace, view.name, images[view.name]["input"]),
             depth_scale=float(images[view.name].get("scale", 1.0)),
+            masks=workspace.masks,
         )
         for view in scene.views
         if view.name in images
@@ -170,6 +171,7 @@ def refined_files(output: OutputWorkspace, scene: Scene) -> list[MapFiles]:
             depth_path=output.depth_map_path(view.name),
             normal_path=output.normal_map_path(view.name),
             confidence_path=output.confidence_map_path(view.name),
+            masks=output.source.masks,
         )
         for view in scene.views
         if output.is_written(view.name)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from resdepth_colmap.config import FuseConfig, Fuser
+from resdepth_colmap.config import FuseConfig, Fuser, MaskConfig
 from resdepth_colmap.errors import FusionError
 from resdepth_colmap.io.colmap.model import read_scene
 from resdepth_colmap.io.colmap.output import OutputWorkspace
@@ -21,6 +21,7 @@ from resdepth_colmap.pipeline.fuse.stage import (
 )
 from resdepth_colmap.pipeline.fuse.views import MapFiles
 from resdepth_colmap.pipeline.manifest import Manifest, Task, key_of, view_facts
+from resdepth_colmap.pipeline.masks import with_masks
 from resdepth_colmap.progress import Progress, SilentProgress
 from resdepth_colmap.scene import Scene
 
@@ -46,6 +47,7 @@ def fuse_to_file(
     target: Path | str = "ply",
     *,
     in_place: bool = False,
+    masks: MaskConfig | None = None,
     progress: Progress | None = None,
 ) -> tuple[Path, int]:
     """Fuse the refined maps of a workspace and write the cloud.
@@ -55,6 +57,7 @@ def fuse_to_file(
         config: Options.
         target: File to write, or a format for the usual file in `resdepth/`.
         in_place: Whether the maps were refined in place.
+        masks: What to leave out; None = what the refinement has left out.
         progress: Is told of each view.
 
     Returns:
@@ -66,16 +69,21 @@ def fuse_to_file(
         ConfigError: If the target's extension is none of a cloud.
     """
     workspace = open_workspace(path)
+    scene = read_scene(workspace.sparse_path, workspace.images_path, workspace.path)
+    workspace = with_masks(workspace, scene, masks or MaskConfig(), after_run=True)
     output = OutputWorkspace(source=workspace, in_place=in_place)
     file = target if isinstance(target, Path) else cloud_path(output, target)
     check_cloud_path(file)
-    scene = read_scene(workspace.sparse_path, workspace.images_path, workspace.path)
     clouds = Clouds(output, scene, config, progress or SilentProgress())
     return file, int(clouds.refined(file, overwrite=False)["points"])
 
 
 class Clouds:
-    """The clouds of a workspace; one that is fresh is not made again."""
+    """The clouds of a workspace; one that is fresh is not made again.
+
+    Attributes:
+        num_made: Clouds made until now.
+    """
 
     def __init__(
         self,
@@ -97,6 +105,7 @@ class Clouds:
         self._config = config
         self._progress = progress
         self._manifest = Manifest(output.path)
+        self.num_made = 0
 
     def refined(self, path: Path, overwrite: bool) -> dict[str, Any]:
         """The cloud of the refined maps; returns what is known of it.
@@ -156,6 +165,7 @@ class Clouds:
         self, task: Task, make: Callable[[], dict[str, Any]], overwrite: bool
     ) -> dict[str, Any]:
         if overwrite or not self._manifest.is_fresh(task):
+            self.num_made += 1
             self._manifest.start(task)
             self._manifest.finish(task, make())
         self._manifest.save()
@@ -184,6 +194,7 @@ class Clouds:
             file.depth_path,
             file.normal_path,
             file.confidence_path,
+            *file.masks.files(file.view.name),
         )
         known = self._manifest.fingerprints
         digests = [

@@ -1,7 +1,6 @@
 """The maps of the views to fuse, read when they are asked for."""
 
 import dataclasses
-from collections import OrderedDict
 from collections.abc import Sequence
 from pathlib import Path
 from typing import overload
@@ -14,7 +13,10 @@ from resdepth_colmap.geometry.normals import normals_from_depth
 from resdepth_colmap.geometry.pixels import index_K
 from resdepth_colmap.geometry.resize import area_resized
 from resdepth_colmap.io.colmap.maps import read_depth_map, read_normal_map
+from resdepth_colmap.io.colmap.masks import Masks
 from resdepth_colmap.io.images import read_rgb
+from resdepth_colmap.pipeline.masks import masked_depth
+from resdepth_colmap.pipeline.recent_cache import RecentCache
 from resdepth_colmap.scene import (
     ColorImage,
     DepthMap,
@@ -51,7 +53,7 @@ class FuseView:
     confidence: FloatMap | None = None
 
     @property
-    def num_bytes(self) -> int:
+    def nbytes(self) -> int:
         """Memory of the maps."""
         maps = (self.depth, self.normals, self.rgb, self.confidence)
         return sum(values.nbytes for values in maps if values is not None)
@@ -75,6 +77,7 @@ class MapFiles:
         depth_scale: What its depths are multiplied with.
         normal_path: Its normal map; None, or no file there = computed from the depth.
         confidence_path: Its confidence; None, or no file there = 1 everywhere.
+        masks: Those of the images: where the view's mask is 0, there is no depth.
     """
 
     view: View
@@ -83,6 +86,18 @@ class MapFiles:
     depth_scale: float = 1.0
     normal_path: Path | None = None
     confidence_path: Path | None = None
+    masks: Masks = Masks()  # noqa: RUF009 (it is frozen)
+
+    def read_depth(self) -> DepthMap:
+        """Read the depth map, scaled, with 0 where the mask is 0.
+
+        Raises:
+            WorkspaceError: If a file is broken, or the mask of another shape.
+        """
+        depth = read_depth_map(self.depth_path)
+        if self.depth_scale != 1.0:
+            depth = np.float32(self.depth_scale) * depth
+        return masked_depth(self.masks, self.view.name, depth)
 
     def read(self) -> FuseView:
         """Read them all.
@@ -90,9 +105,7 @@ class MapFiles:
         Raises:
             WorkspaceError: If a file is broken, or two maps differ in size.
         """
-        depth = read_depth_map(self.depth_path)
-        if self.depth_scale != 1.0:
-            depth = np.float32(self.depth_scale) * depth
+        depth = self.read_depth()
         height_px, width_px = depth.shape
         K = index_K(self.view.camera.resized(width_px, height_px))
         return FuseView(
@@ -127,8 +140,7 @@ class LazyViews(Sequence[FuseView]):
     def __init__(self, files: Sequence[MapFiles], max_num_bytes: int) -> None:
         """Keep views up to that many bytes in all, but at least one."""
         self._files = files
-        self._max_num_bytes = max_num_bytes
-        self._kept: OrderedDict[int, FuseView] = OrderedDict()
+        self._cache = RecentCache(max_num_bytes)
 
     def __len__(self) -> int:
         """The number of views, read or not."""
@@ -141,16 +153,8 @@ class LazyViews(Sequence[FuseView]):
     def __getitem__(self, index: int | slice) -> FuseView | Sequence[FuseView]:
         """A view; WorkspaceError if it cannot be read."""
         if isinstance(index, slice):
-            return LazyViews(self._files[index], self._max_num_bytes)
-        if index not in self._kept:
-            self._kept[index] = self._files[index].read()
-        self._kept.move_to_end(index)
-        while len(self._kept) > 1 and self._num_bytes() > self._max_num_bytes:
-            self._kept.popitem(last=False)
-        return self._kept[index]
-
-    def _num_bytes(self) -> int:
-        return sum(view.num_bytes for view in self._kept.values())
+            return LazyViews(self._files[index], self._cache.max_num_bytes)
+        return self._cache.get(index, self._files[index].read)
 
 
 def _check_size(

@@ -12,7 +12,7 @@ from resdepth_colmap.geometry.completion import complete_from_background
 from resdepth_colmap.geometry.forward_warp import reproject_inverse_depth
 from resdepth_colmap.geometry.inverse_depth import invert_map
 from resdepth_colmap.pipeline.refine.network_inputs import initial_maps
-from resdepth_colmap.scene import DepthMap, FloatMap, Matrix, projection_center
+from resdepth_colmap.scene import DepthMap, FloatMap, Matrix, Wanted, projection_center
 
 FILTERED_SHARE = 0.95
 """A map with less of its pixels filled has been filtered."""
@@ -69,7 +69,12 @@ class Start(NamedTuple):
     is_filtered: bool = False
 
 
-def start_from(depth: DepthMap, K: Matrix, maps: Sequence[SourceMap]) -> Start:
+def start_from(
+    depth: DepthMap,
+    K: Matrix,
+    maps: Sequence[SourceMap],
+    wanted: Wanted | None = None,
+) -> Start:
     """Complete a depth map, and compare it with those of other views.
 
     In an unfiltered map only what another one confirms is taken for measured; the rest
@@ -80,12 +85,15 @@ def start_from(depth: DepthMap, K: Matrix, maps: Sequence[SourceMap]) -> Start:
         depth: Initial depth, shape (H, W), in units; 0 = hole.
         K: K for index coordinates, shape (3, 3), in pixels.
         maps: Those of other views, the first that of the best; may be empty.
+        wanted: Pixels that should have a depth, shape (H, W): others tell nothing of a
+            filter; None = all.
 
     Raises:
         ValueError: If no pixel is valid.
     """
     filled, valid = initial_maps(depth)
-    is_filtered = bool(valid.mean() < FILTERED_SHARE)
+    share = valid.mean() if wanted is None else valid[wanted].mean()
+    is_filtered = bool(share < FILTERED_SHARE)
     alone = Start(filled, valid, is_filtered=is_filtered)
     if not maps:
         return alone

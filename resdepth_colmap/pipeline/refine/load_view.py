@@ -44,7 +44,7 @@ def view_inputs(
     images: ViewImages,
     maps: Mapping[int, DepthMap] | None = None,
 ) -> ViewInputs:
-    """The view at the size of its map, its sources at the same scale.
+    """The view at the size of its map, its sources at the same scale, and their masks.
 
     Args:
         scene: The views.
@@ -71,6 +71,7 @@ def view_inputs(
                 gray=images.gray(source, source_camera),
                 K=index_K(source_camera),
                 source_from_reference=cam_from_cam(source, view),
+                wanted=images.wanted(source, source_camera),
             )
         )
     return ViewInputs(
@@ -80,9 +81,10 @@ def view_inputs(
         K=index_K(camera),
         sources=tuple(second_views),
         source_maps=tuple(
-            _source_map(scene.views[other], view, source_depth)
+            _source_map(scene.views[other], view, source_depth, images)
             for other, source_depth in (maps or {}).items()
         ),
+        wanted=images.wanted(view, camera),
     )
 
 
@@ -90,10 +92,14 @@ def _scaled(depth: DepthMap, scale: float) -> DepthMap:
     return depth if scale == 1.0 else np.float32(scale) * depth
 
 
-def _source_map(source: View, reference: View, depth: DepthMap) -> SourceMap:
+def _source_map(
+    source: View, reference: View, depth: DepthMap, images: ViewImages
+) -> SourceMap:
     height_px, width_px = depth.shape
+    camera = source.camera.resized(width_px, height_px)
+    wanted = images.wanted(source, camera)
     return SourceMap(
-        depth=depth,
-        K=index_K(source.camera.resized(width_px, height_px)),
+        depth=depth if wanted is None else np.where(wanted, depth, np.float32(0)),
+        K=index_K(camera),
         source_from_reference=cam_from_cam(source, reference),
     )

@@ -133,15 +133,19 @@ def view_record(
     task: ViewTask, scene: Scene, data: ViewInputs, result: RefinedView
 ) -> dict[str, Any]:
     """What run.json says of a refined image."""
-    known = (data.depth > 0) & (result.depth > 0)
-    before, after = data.depth[known], result.depth[known]
+    depth, filled = data.depth, task.initial.filled
+    if data.wanted is not None:
+        depth = data.wanted_depth
+        filled = float(np.mean(depth > 0))
+    known = (depth > 0) & (result.depth > 0)
+    before, after = depth[known], result.depth[known]
     change = float(np.median(np.abs(after - before) / before)) if known.any() else 0.0
     return {
         "input": task.initial.kind,
         "scale": task.initial.scale,
         "sources": _sources(task.sources, scene),
         "source_maps": [scene.views[it.view_index].name for it in task.source_maps],
-        "filled_before": round(task.initial.filled, 6),
+        "filled_before": round(filled, 6),
         "filled_after": round(float(np.mean(result.depth > 0)), 6),
         "median_relative_change": round(change, 6),
     }

@@ -36,6 +36,7 @@ LEAST_VALID_SHARE = 0.05  # below it, filled pixels count in the statistics too
 LEAST_RELATIVE_SPREAD = 0.02  # of the median: a fronto-parallel wall has no spread
 STATISTICS_SIDE_PX = 256  # quantiles of more pixels than that squared cost only time
 LARGEST_CHANGE = 4.0  # relative, of what another map says; more is an outlier
+LEAST_WEIGHT = 1e-3  # of a pixel in an interpolated value
 DEFAULT_BASELINE_RATIO = 0.1  # baseline over depth where there is no second view
 
 
@@ -55,6 +56,8 @@ class ViewTensors(NamedTuple):
         colors: RGB values of the reference in 0..1, shape (B, 3, H, W); None = it is
             grey.
         is_filtered: Whether a filter has left its holes, so that what is there is sure.
+        wanted: Which pixels of the reference count, shape (B, 1, H, W), bool; None =
+            all. The others are black, and have no valid depth.
     """
 
     inverse_depth: Tensor
@@ -66,6 +69,7 @@ class ViewTensors(NamedTuple):
     num_consistent: Tensor | None = None
     colors: Tensor | None = None
     is_filtered: bool = False
+    wanted: Tensor | None = None
 
 
 class InputStack(NamedTuple):
@@ -196,17 +200,28 @@ def build_inputs(
 
 
 def warp_sources(view: ViewTensors, num_sources: int) -> list[tuple[Tensor, Tensor]]:
-    """The first sources in the reference camera: (image, inside) of each."""
-    return [
-        warp_to_reference(
-            source.gray,
-            view.inverse_depth,
-            view.K,
-            source.K,
-            source.source_from_reference,
-        )
-        for source in view.sources[:num_sources]
-    ]
+    """The first sources in the reference camera: (image, inside) of each.
+
+    Pixels that do not count, of either view, are as outside.
+    """
+    return [_warped(view, source) for source in view.sources[:num_sources]]
+
+
+def _warped(view: ViewTensors, source: SourceTensors) -> tuple[Tensor, Tensor]:
+    planes = source.gray
+    if source.wanted is not None:
+        planes = torch.cat([planes, source.wanted.to(planes.dtype)], dim=1)
+    warped, inside = warp_to_reference(
+        planes, view.inverse_depth, view.K, source.K, source.source_from_reference
+    )
+    image, wanted = warped[:, :1], warped[:, 1:]
+    if source.wanted is not None:  # all of the four pixels that are interpolated
+        inside = inside & (wanted > 1.0 - LEAST_WEIGHT)
+    if view.wanted is not None:
+        inside = inside & view.wanted
+    if source.wanted is not None or view.wanted is not None:
+        image = torch.where(inside, image, 0.0)
+    return image, inside
 
 
 def tile_scaling(stack: InputStack, kind: Normalisation) -> Scaling:

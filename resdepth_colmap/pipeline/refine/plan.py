@@ -59,7 +59,7 @@ class ViewTask(Task):
         sources: Its second views, best first; () for a network that needs none.
         source_maps: The depth maps of other views that it is compared with: initial
             ones, or what the iteration before made of them.
-        reads: All files that it reads: images and depth maps.
+        reads: All files that it reads: images, depth maps and masks.
     """
 
     index: int
@@ -243,6 +243,10 @@ class _Planner:
                     for other in others
                     for found in [self.initial[other]]
                 ],
+                "masks": [
+                    self._mask(view.name)
+                    for view in (*seen, *(views[other] for other in others))
+                ],
             }
         )
         self._first_keys[index] = key
@@ -253,6 +257,7 @@ class _Planner:
         return {
             "inner_iterations": self.config.inner_iterations,
             "update_gating": self.config.update_gating,
+            "keep_empty": self.config.keep_empty,
             "tile_px": self.config.tile_px,
             "overlap_px": self.config.overlap_px,
             "weights": self.weights,
@@ -265,12 +270,16 @@ class _Planner:
         sources: tuple[SourceChoice, ...],
         maps: tuple[MapRead, ...],
     ) -> tuple[Path, ...]:
-        indices = (index, *(choice.index for choice in sources))
-        images = (self.scene.views[i].name for i in indices)
+        names = [self.scene.views[choice.index].name for choice in sources]
+        names.insert(0, self.scene.views[index].name)
+        others = (self.scene.views[found.view_index].name for found in maps)
+        masks = self.workspace.masks
+        masked = dict.fromkeys((*names, *others))
         return (
-            *(self.workspace.image_path(name) for name in images),
+            *(self.workspace.image_path(name) for name in names),
             self._initial(index).path,
             *(found.path for found in maps),
+            *(path for name in masked for path in masks.files(name)),
         )
 
     def _initial(self, index: int) -> InitialMap:
@@ -299,6 +308,10 @@ class _Planner:
     def _image(self, name: str) -> str | None:
         path = self.workspace.image_path(name)
         return self.fingerprints.of(path) if path.is_file() else None
+
+    def _mask(self, name: str) -> list[str]:
+        files = self.workspace.masks.files(name)
+        return [self.fingerprints.of(path) for path in files]
 
     def _earlier_map(self, name: str, iteration: int) -> tuple[Path]:
         folder = self.output.path / ITERATIONS_FOLDER / str(iteration)

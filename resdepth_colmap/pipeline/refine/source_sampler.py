@@ -16,15 +16,24 @@ class SourceTensors(NamedTuple):
         gray: Grey values in 0..1, shape (B, 1, Hs, Ws).
         K: K for index coordinates, shape (B, 3, 3), in pixels.
         source_from_reference: Pose, shape (B, 3, 4), translation in units.
+        wanted: Which of its pixels count, shape (B, 1, Hs, Ws), bool; None = all. The
+            others are black.
     """
 
     gray: Tensor
     K: Tensor
     source_from_reference: Tensor
+    wanted: Tensor | None = None
 
     def item(self, place: int) -> Self:
         """One of a batch, as a batch of one."""
-        return type(self)(*(values[place : place + 1] for values in self))
+        one = slice(place, place + 1)
+        return type(self)(
+            self.gray[one],
+            self.K[one],
+            self.source_from_reference[one],
+            None if self.wanted is None else self.wanted[one],
+        )
 
 
 class Sight(NamedTuple):

@@ -5,7 +5,7 @@ import dataclasses
 import logging
 from typing import Any, NoReturn
 
-from resdepth_colmap.config import RefineConfig
+from resdepth_colmap.config import MaskConfig, RefineConfig
 from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.io.colmap.model import read_scene
 from resdepth_colmap.io.colmap.output import OutputWorkspace, read_record, write_record
@@ -17,6 +17,7 @@ from resdepth_colmap.network.unet import ResDepthNet
 from resdepth_colmap.network.weights import load_weights, weights_hash
 from resdepth_colmap.pipeline.initial_map import check_maps_exist
 from resdepth_colmap.pipeline.manifest import Manifest
+from resdepth_colmap.pipeline.masks import with_masks
 from resdepth_colmap.pipeline.refine.loop import RefineLoop
 from resdepth_colmap.pipeline.refine.plan import Skipped, plan_refine
 from resdepth_colmap.progress import Progress, SilentProgress
@@ -87,6 +88,7 @@ def refine_workspace(
     *,
     in_place: bool = False,
     overwrite: bool = False,
+    masks: MaskConfig | None = None,
     progress: Progress | None = None,
 ) -> RefineReport:
     """Refine the depth maps of a workspace and write them where COLMAP finds them.
@@ -100,6 +102,7 @@ def refine_workspace(
         in_place: Replace the geometric maps of the workspace (originals are kept)
             instead of writing to `resdepth/`.
         overwrite: Refine again what is fresh.
+        masks: Which pixels of the images are ignored; None = the defaults.
         progress: Is told of each image.
 
     Raises:
@@ -111,6 +114,7 @@ def refine_workspace(
     config = config or RefineConfig()
     scene = read_scene(workspace.sparse_path, workspace.images_path, workspace.path)
     check_maps_exist(workspace, scene, config.input)
+    workspace = with_masks(workspace, scene, masks or MaskConfig())
     network = load_network(config)
     output = OutputWorkspace(source=workspace, in_place=in_place)
     output.prepare([view.name for view in scene.views])

@@ -33,6 +33,7 @@ from resdepth_colmap.scene import (
     Matrix,
     NormalMap,
     UnitColors,
+    Wanted,
 )
 
 LEAST_INVERSE_RATIO = 0.25
@@ -54,11 +55,13 @@ class SourceView:
         gray: Its image, of any size, shape (Hs, Ws), in 0..1.
         K: K for index coordinates of that size, shape (3, 3), in pixels.
         source_from_reference: Pose, shape (3, 4), translation in units.
+        wanted: Which of its pixels are looked at, shape (Hs, Ws); None = all.
     """
 
     gray: GrayImage
     K: Matrix
     source_from_reference: Matrix
+    wanted: Wanted | None = None
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
@@ -73,6 +76,8 @@ class ViewInputs:
         sources: Second views, best first; may be empty.
         source_maps: Depth maps of other views, the first that of the best; may be
             empty.
+        wanted: Which pixels are refined, shape (H, W); None = all. The others are
+            neither looked at nor given a depth.
     """
 
     depth: DepthMap
@@ -81,9 +86,10 @@ class ViewInputs:
     sources: tuple[SourceView, ...] = ()
     source_maps: tuple[SourceMap, ...] = ()
     colors: UnitColors | None = None
+    wanted: Wanted | None = None
 
     def __post_init__(self) -> None:
-        """Check that image and depth map have one size."""
+        """Check that image, mask and depth map have one size."""
         if self.gray.shape != self.depth.shape:
             raise ValueError(
                 f"{self.gray.shape=} but expected that of the depth map, "
@@ -94,6 +100,18 @@ class ViewInputs:
                 f"{self.colors.shape=} but expected RGB values of the size of the "
                 f"depth map, {self.depth.shape}."
             )
+        if self.wanted is not None and self.wanted.shape != self.depth.shape:
+            raise ValueError(
+                f"{self.wanted.shape=} but expected that of the depth map, "
+                f"{self.depth.shape}."
+            )
+
+    @property
+    def wanted_depth(self) -> DepthMap:
+        """The initial depth of the pixels that are refined; 0 elsewhere."""
+        if self.wanted is None:
+            return self.depth
+        return np.where(self.wanted, self.depth, np.float32(0))
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
@@ -101,11 +119,13 @@ class RefinedView:
     """A refined depth map.
 
     Attributes:
-        depth: Shape (H, W), float32, in units, > 0 everywhere.
-        normals: Camera frame, towards the camera, shape (H, W, 3), float32.
+        depth: Shape (H, W), float32, in units, > 0 at each wanted pixel, else 0.
+        normals: Camera frame, towards the camera, shape (H, W, 3), float32; (0, 0, 0)
+            where there is no depth.
         confidence: Probability in 0..1 that the depth is within 1 % of the truth, by
             the network's own estimate of its error, shape (H, W), float32. From a
             network that makes none: the correlation with the best source, at least 0.
+            0 where there is no depth.
     """
 
     depth: DepthMap
@@ -132,11 +152,14 @@ def refine_view(
         config: Passes and tiles.
 
     Returns:
-        Depth, normals and confidence.
+        Depth, normals and confidence; none of a view of which no pixel is wanted that
+        has an initial depth.
 
     Raises:
         ValueError: If the initial depth map has no valid pixel.
     """
+    if view.wanted is not None and not view.wanted_depth.any():
+        return _nothing(view.depth.shape)
     device = next(network.parameters()).device
     with _inference(network):
         tensors = view_tensors(view, device, network.config.source_depth)
@@ -162,12 +185,28 @@ def refine_view(
             confidence = 1.0 - torch.exp(-CONFIDENT_ERROR * refined / error)
         else:
             confidence = _correlation(tensors, network.config.num_sources)
-    depth = invert_map(_array(refined))
+    depth, confidence_map = invert_map(_array(refined)), _array(confidence)
+    if (kept := _kept(view, config)) is not None:
+        depth = np.where(kept, depth, np.float32(0))
+        confidence_map = np.where(kept, confidence_map, np.float32(0))
     return RefinedView(
         depth=depth,
         normals=normals_from_depth(depth, view.K),
-        confidence=_array(confidence),
+        confidence=confidence_map,
     )
+
+
+def _nothing(shape: tuple[int, ...]) -> RefinedView:
+    blank = np.zeros(shape, np.float32)
+    normals = np.zeros((*shape, 3), np.float32)
+    return RefinedView(depth=blank, normals=normals, confidence=blank)
+
+
+def _kept(view: ViewInputs, config: RefineConfig) -> Wanted | None:
+    """Which pixels of the result are kept; None = all."""
+    if config.keep_empty:
+        return invert_map(view.wanted_depth) > 0
+    return view.wanted
 
 
 @contextlib.contextmanager
@@ -230,25 +269,37 @@ def view_tensors(view: ViewInputs, device: torch.device, use_maps: bool) -> View
     Raises:
         ValueError: If the initial depth map has no valid pixel.
     """
-    start = start_from(view.depth, view.K, view.source_maps if use_maps else ())
+    maps = view.source_maps if use_maps else ()
+    start = start_from(view.wanted_depth, view.K, maps, view.wanted)
     return ViewTensors(
         inverse_depth=_image(start.inverse_depth, device),
         valid=_mask(start.valid, device),
-        gray=_image(view.gray, device),
-        colors=None if view.colors is None else _colors(view.colors, device),
+        gray=_image(_seen(view.gray, view.wanted), device),
+        colors=None
+        if view.colors is None
+        else _colors(_seen(view.colors, view.wanted), device),
         K=torch.from_numpy(view.K)[None],
         sources=tuple(
             SourceTensors(
-                _image(source.gray, device),
+                _image(_seen(source.gray, source.wanted), device),
                 torch.from_numpy(source.K)[None],
                 torch.from_numpy(source.source_from_reference)[None],
+                None if source.wanted is None else _mask(source.wanted, device),
             )
             for source in view.sources
         ),
         reprojected=_map(start.reprojected, device),
         num_consistent=_map(start.num_consistent, device),
         is_filtered=start.is_filtered,
+        wanted=None if view.wanted is None else _mask(view.wanted, device),
     )
+
+
+def _seen(image: FloatMap, wanted: Wanted | None) -> FloatMap:
+    """An image, grey or in colour, black where it is not to be looked at."""
+    if wanted is None:
+        return image
+    return np.where(wanted if image.ndim == 2 else wanted[..., None], image, 0.0)
 
 
 def _image(gray: GrayImage, device: torch.device) -> Tensor:

@@ -9,7 +9,6 @@ import numpy as np
 
 from resdepth_colmap.config import StereoConfig
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.geometry.resize import nearest_resized
 from resdepth_colmap.io.colmap.cfg import (
     SourceKind,
     SourceSpec,
@@ -17,12 +16,13 @@ from resdepth_colmap.io.colmap.cfg import (
 )
 from resdepth_colmap.io.colmap.maps import (
     read_depth_map,
+    read_map_size,
     read_normal_map,
     write_depth_map,
     write_normal_map,
 )
-from resdepth_colmap.io.colmap.masks import mask_file, read_mask
 from resdepth_colmap.io.colmap.workspace import Workspace
+from resdepth_colmap.pipeline.masks import wanted_pixels
 from resdepth_colmap.pipeline.stereo.passes import GEOMETRIC, PHOTOMETRIC
 from resdepth_colmap.pipeline.stereo.plan import plan_stereo
 from resdepth_colmap.scene import Scene
@@ -48,10 +48,9 @@ def run_colmap(workspace: Workspace, scene: Scene, config: StereoConfig) -> None
         _run_without_points(workspace, scene, config, options)
     else:
         pycolmap.patch_match_stereo(str(workspace.path), options=options)
-    if config.mask_path is not None:
-        for view in scene.views:
-            for kind in (PHOTOMETRIC, GEOMETRIC):
-                _lay_mask(workspace, config, view.name, kind)
+    for view in scene.views:
+        for kind in (PHOTOMETRIC, GEOMETRIC):
+            _lay_mask(workspace, view.name, kind)
 
 
 def _run_without_points(
@@ -90,15 +89,14 @@ def said_options(config: StereoConfig) -> dict[str, Any]:
     }
 
 
-def _lay_mask(workspace: Workspace, config: StereoConfig, name: str, kind: str) -> None:
+def _lay_mask(workspace: Workspace, name: str, kind: str) -> None:
     depth_path = workspace.depth_map_path(name, kind)
-    if config.mask_path is None or not depth_path.is_file():
+    if not depth_path.is_file():
         return
-    path = mask_file(config.mask_path, name)
-    if not path.is_file():
+    wanted = wanted_pixels(workspace.masks, name, read_map_size(depth_path))
+    if wanted is None:
         return
     depth = read_depth_map(depth_path)
-    wanted = nearest_resized(read_mask(path), depth.shape[::-1])
     write_depth_map(depth_path, np.where(wanted, depth, np.float32(0)))
     normal_path = workspace.normal_map_path(name, kind)
     if normal_path.is_file():

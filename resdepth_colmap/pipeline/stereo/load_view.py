@@ -8,15 +8,14 @@ from resdepth_colmap.config import StereoConfig
 from resdepth_colmap.geometry.holes import fill_holes
 from resdepth_colmap.geometry.normals import normals_from_depth
 from resdepth_colmap.geometry.pixels import index_K
-from resdepth_colmap.geometry.resize import nearest_resized
 from resdepth_colmap.io.colmap.maps import read_normal_map
-from resdepth_colmap.io.colmap.masks import Wanted, mask_file, read_mask
 from resdepth_colmap.io.colmap.workspace import Workspace
 from resdepth_colmap.matching.patch_match import MatchView, Surface
+from resdepth_colmap.pipeline.masks import wanted_pixels
 from resdepth_colmap.pipeline.stereo.depth_range_probe import PROBE_SIDE_PX, is_wide
 from resdepth_colmap.pipeline.stereo.passes import GEOMETRIC, PHOTOMETRIC, MatchTask
 from resdepth_colmap.pipeline.view_images import ViewImages, camera_of_size
-from resdepth_colmap.scene import Camera, DepthMap, NormalMap, Scene, View
+from resdepth_colmap.scene import Camera, DepthMap, NormalMap, Scene, View, Wanted
 
 BYTES_PER_GB = 1 << 30  # COLMAP's unit of cache_size
 
@@ -165,8 +164,5 @@ class MatchLoader:
     def _wanted(self, view: View, camera: Camera) -> Wanted:
         """Where a depth is wanted: everywhere, or where the mask says so."""
         size = (camera.width_px, camera.height_px)
-        if self._config.mask_path is not None:
-            path = mask_file(self._config.mask_path, view.name)
-            if path.is_file():
-                return nearest_resized(read_mask(path), size)
-        return np.ones(size[::-1], np.bool_)
+        wanted = wanted_pixels(self._workspace.masks, view.name, size)
+        return np.ones(size[::-1], np.bool_) if wanted is None else wanted

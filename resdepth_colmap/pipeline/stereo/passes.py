@@ -7,11 +7,9 @@ its sources, too.
 
 import dataclasses
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 from resdepth_colmap.config import StereoConfig
-from resdepth_colmap.io.colmap.masks import mask_file
 from resdepth_colmap.io.colmap.workspace import Workspace
 from resdepth_colmap.matching.patch_match import METHOD
 from resdepth_colmap.pipeline.manifest import Manifest, Task, key_of, view_facts
@@ -26,7 +24,6 @@ _DECIDE_NOTHING = (
     "cache_size",
     "depth_max",
     "depth_min",
-    "mask_path",
     "max_num_sources",
     "min_triangulation_angle",
 )
@@ -125,9 +122,14 @@ def recorded_config(manifest: Manifest) -> StereoConfig | None:
         options = dict(facts.get("options") or options)
     if not manifest.has_any(STAGE):
         return None
-    mask_path = options.get("mask_path")
-    options["mask_path"] = None if mask_path is None else Path(mask_path)
-    return StereoConfig.from_mapping(options)
+    known = {field.name for field in dataclasses.fields(StereoConfig)}
+    return StereoConfig(**{k: value for k, value in options.items() if k in known})
+
+
+def were_masked(manifest: Manifest) -> bool:
+    """Whether any map of ours in a workspace was made with masks."""
+    noted = (facts.get("masks") for facts in manifest.facts_of(STAGE))
+    return any(isinstance(masks, dict) and any(masks.values()) for masks in noted)
 
 
 def is_fresh(task: MatchTask, manifest: Manifest) -> bool:
@@ -167,7 +169,9 @@ class _Keys:
         indices = (plan.index, *plan.sources)
         maps = [self._map(index, first.get(index)) for index in indices]
         views = [self._view(index) for index in indices]
-        return key_of([self._options(GEOMETRIC), plan.depth_range, views, maps])
+        mask = self._mask(plan.index)
+        facts = [self._options(GEOMETRIC), plan.depth_range, views, maps]
+        return key_of(facts if mask is None else [*facts, mask])
 
     def _map(self, index: int, task: MatchTask | None) -> str | None:
         """What tells one photometric map from another: its input, or its file."""
@@ -183,12 +187,9 @@ class _Keys:
         image = self.manifest.fingerprints.of(path) if path.is_file() else None
         return [*view_facts(view), image]
 
-    def _mask(self, index: int) -> str | None:
-        folder = self.config.mask_path
-        if folder is None:
-            return None
-        path = mask_file(folder, self.scene.views[index].name)
-        return self.manifest.fingerprints.of(path) if path.is_file() else None
+    def _mask(self, index: int) -> list[str] | None:
+        files = self.workspace.masks.files(self.scene.views[index].name)
+        return [self.manifest.fingerprints.of(path) for path in files] or None
 
     def _options(self, kind: str) -> dict[str, Any]:
         """Those that decide the maps of that kind."""

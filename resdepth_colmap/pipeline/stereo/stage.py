@@ -11,10 +11,9 @@ from resdepth_colmap.io.colmap.maps import (
     write_depth_map,
     write_normal_map,
 )
-from resdepth_colmap.io.colmap.masks import check_masks
 from resdepth_colmap.io.colmap.model import read_image_indices
 from resdepth_colmap.io.colmap.workspace import Workspace
-from resdepth_colmap.pipeline.manifest import Manifest
+from resdepth_colmap.pipeline.masks import mask_facts
 from resdepth_colmap.pipeline.stereo.colmap import run_colmap
 from resdepth_colmap.pipeline.stereo.load_view import MatchLoader
 from resdepth_colmap.pipeline.stereo.passes import MatchTask
@@ -97,7 +96,7 @@ def stereo_workspace(
     The photometric ones are whole; the geometric ones, which are matched against the
     depth of the sources, too, are filtered, unless the options say otherwise. Maps of
     others are never replaced unless `overwrite` says so; our own are made anew when an
-    option or an input changed.
+    option or an input changed. Where a mask of the workspace is 0 there is no depth.
 
     Raises:
         WorkspaceError: If an image cannot be read, or nothing could be matched.
@@ -109,12 +108,11 @@ def stereo_workspace(
         return StereoReport(backend=backend, kept=tuple(names))
     if backend is StereoBackend.COLMAP:
         return _run_colmap(workspace, scene, config)
-    _check_masks(scene, config)
     if requested is StereoBackend.AUTO and not overwrite:
         work = plan_auto(workspace, scene, config)
     else:
         work = plan_work(workspace, scene, config, overwrite=overwrite)
-    return _run_cpu(workspace, scene, work, progress or SilentProgress())
+    return _run_cpu(scene, work, progress or SilentProgress())
 
 
 def _run_colmap(
@@ -125,15 +123,13 @@ def _run_colmap(
     return StereoReport(backend=StereoBackend.COLMAP, matched=names)
 
 
-def _run_cpu(
-    workspace: Workspace, scene: Scene, work: StereoWork, progress: Progress
-) -> StereoReport:
+def _run_cpu(scene: Scene, work: StereoWork, progress: Progress) -> StereoReport:
     for name, reason in work.skipped:
         logger.warning("%s is skipped: %s.", name, reason)
     if work.pending:
         say_plan(scene, work.plans, work.config)
         warm_up(work.config)
-    loop = _Loop(workspace, scene, work.config, work.manifest)
+    loop = _Loop(scene, work)
     matched: dict[str, None] = {}
     failed: dict[str, str] = {}
     num_units = sum(task.which.num_units for task in work.pending)
@@ -154,25 +150,23 @@ def _run_cpu(
         kept=tuple(n for n in names if n not in matched and n not in failed),
         skipped=(*work.skipped, *failed.items()),
     )
-    _check_any(workspace, report)
+    _check_any(work.workspace, report)
     return report
 
 
 class _Loop:
     """Does tasks: load, match, store."""
 
-    def __init__(
-        self,
-        workspace: Workspace,
-        scene: Scene,
-        config: StereoConfig,
-        manifest: Manifest,
-    ) -> None:
-        self.workspace = workspace
+    def __init__(self, scene: Scene, work: StereoWork) -> None:
+        self.workspace = work.workspace
         self.scene = scene
-        self.config = config
-        self.manifest = manifest
-        self.loader = MatchLoader(workspace, scene, config)
+        self.config = work.config
+        self.manifest = work.manifest
+        self.loader = MatchLoader(work.workspace, scene, work.config)
+        self.facts = {
+            "options": work.config.to_mapping(),
+            "masks": mask_facts(work.workspace),
+        }
         self.probed: dict[int, tuple[float, float]] = {}
 
     def do(self, task: MatchTask, advance: Advance) -> str:
@@ -198,7 +192,7 @@ class _Loop:
     def _store(self, task: MatchTask, found: Matched) -> None:
         """Write the maps, each whole or not at all."""
         depth_path, normal_path, *graph_path = task.writes
-        self.manifest.start(task, {"options": self.config.to_mapping()})
+        self.manifest.start(task, self.facts)
         if found.agrees is not None and graph_path:
             sources = (self.scene.views[index] for index in task.plan.sources)
             write_consistency_graph(
@@ -208,25 +202,11 @@ class _Loop:
             )
         write_normal_map(normal_path, found.surface.normals)
         write_depth_map(depth_path, found.surface.depth)
-        self.manifest.finish(task, {"options": self.config.to_mapping()})
+        self.manifest.finish(task, self.facts)
 
     @functools.cached_property
     def _model_indices(self) -> dict[int, int]:
         return read_image_indices(self.workspace.sparse_path)
-
-
-def _check_masks(scene: Scene, config: StereoConfig) -> None:
-    if config.mask_path is None:
-        return
-    cameras = {view.name: view.camera for view in scene.views}
-    num_masks = check_masks(config.mask_path, cameras)
-    if num_masks < len(cameras):
-        logger.warning(
-            "%s: masks for %d of %d images (<image name>.png).",
-            config.mask_path,
-            num_masks,
-            len(cameras),
-        )
 
 
 def _check_any(workspace: Workspace, report: StereoReport) -> None:

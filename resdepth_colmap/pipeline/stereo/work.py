@@ -6,6 +6,7 @@ from pathlib import Path
 
 from resdepth_colmap.config import StereoConfig
 from resdepth_colmap.errors import WorkspaceError
+from resdepth_colmap.io.colmap.masks import Masks
 from resdepth_colmap.io.colmap.workspace import Workspace
 from resdepth_colmap.pipeline.initial_map import map_path
 from resdepth_colmap.pipeline.manifest import Manifest
@@ -18,6 +19,7 @@ from resdepth_colmap.pipeline.stereo.passes import (
     map_name,
     match_tasks,
     recorded_config,
+    were_masked,
 )
 from resdepth_colmap.pipeline.stereo.plan import Skipped, StereoPlan, plan_stereo
 from resdepth_colmap.scene import Scene, View
@@ -28,6 +30,7 @@ class StereoWork:
     """What the CPU PatchMatch has to do.
 
     Attributes:
+        workspace: Where the maps go, with the masks that they are made with.
         config: Options.
         manifest: Knows what is fresh.
         plans: All views that can be matched.
@@ -35,6 +38,7 @@ class StereoWork:
         pending: What is to be done, in order.
     """
 
+    workspace: Workspace
     config: StereoConfig
     manifest: Manifest
     plans: tuple[StereoPlan, ...]
@@ -60,7 +64,8 @@ def plan_auto(workspace: Workspace, scene: Scene, config: StereoConfig) -> Stere
 
     Where maps of ours are there, all that is missing or not fresh, with the options
     that those were made with. Where all maps are somebody else's, photometric maps of
-    the views that have none; blank maps count as none.
+    the views that have none; blank maps count as none. Maps that were made without
+    masks need not be made again for masks, which the refinement lays over them.
 
     Args:
         workspace: Where the maps lie.
@@ -75,6 +80,8 @@ def plan_auto(workspace: Workspace, scene: Scene, config: StereoConfig) -> Stere
     with_map = views_with_map(workspace, scene, manifest)
     if recorded is not None:
         config = recorded
+        if not were_masked(manifest):
+            workspace = dataclasses.replace(workspace, masks=Masks())
     elif with_map:
         config = dataclasses.replace(config, geom_consistency=False)
     plans, skipped = plan_stereo(workspace, scene, config, all_views=True)
@@ -122,6 +129,7 @@ def _work(
     manifest, plans, skipped = known
     passes = match_tasks(workspace, scene, plans, config, manifest)
     return StereoWork(
+        workspace=workspace,
         config=config,
         manifest=manifest,
         plans=plans,

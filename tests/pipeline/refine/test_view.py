@@ -11,10 +11,13 @@ from resdepth_colmap.network.network_config import (
     InputVariant,
     Normalisation,
 )
+from resdepth_colmap.pipeline.refine.network_inputs import seen_by_sources
+from resdepth_colmap.pipeline.refine.photometric_error import NO_EVIDENCE
 from resdepth_colmap.pipeline.refine.view import (
     RefinedView,
     ViewInputs,
     refine_view,
+    view_tensors,
 )
 
 
@@ -166,3 +169,103 @@ def test_colours_of_another_size_are_a_bug_of_the_caller() -> None:
     initial = view()
     with pytest.raises(ValueError, match="colors"):
         dataclasses.replace(initial, colors=np.zeros((3, 4, 3), np.float32))
+
+
+def masked_view(seed: int) -> ViewInputs:
+    """A view of which masks leave out other content for each seed."""
+    rng = np.random.default_rng(seed)
+    initial = view(outliers=True)
+    (source,) = initial.sources
+    flags = np.ones(initial.depth.shape, np.bool_)
+    flags[10:30, 20:50] = False
+    flags[:, :8] = False
+    source_flags = np.ones(source.gray.shape, np.bool_)
+    source_flags[20:40, 10:30] = False
+    noise = rng.random((3, *initial.depth.shape)).astype(np.float32)
+    source_noise = rng.random(source.gray.shape).astype(np.float32)
+    gray = np.where(flags, initial.gray, noise[0])
+    hidden = dataclasses.replace(
+        source,
+        gray=np.where(source_flags, source.gray, source_noise),
+        wanted=source_flags,
+    )
+    return dataclasses.replace(
+        initial,
+        depth=np.where(flags, initial.depth, np.float32(3 + seed) * noise[1]),
+        gray=gray,
+        colors=np.repeat(gray[..., None], 3, axis=2),
+        sources=(hidden,),
+        wanted=flags,
+    )
+
+
+@pytest.mark.parametrize("confidence", [False, True])
+@pytest.mark.parametrize("inner_iterations", [1, 2])
+def test_what_masks_leave_out_is_neither_seen_nor_given_a_depth(
+    confidence: bool, inner_iterations: int
+) -> None:
+    net = network(seed=5, confidence=confidence)
+    config = dataclasses.replace(TILES, inner_iterations=inner_iterations)
+    one, other = masked_view(0), masked_view(1)
+    refined, again = (refine_view(it, net, config) for it in (one, other))
+    assert one.wanted is not None
+    for found in (refined, again):
+        assert not found.depth[~one.wanted].any()
+        assert not found.normals[~one.wanted].any()
+        assert not found.confidence[~one.wanted].any()
+        assert (found.depth[one.wanted] > 0).all()
+        assert (found.normals[..., 2][one.wanted] < 0).all()
+    np.testing.assert_allclose(refined.depth, again.depth, rtol=1e-5)
+    np.testing.assert_allclose(refined.normals, again.normals, atol=1e-5)
+    np.testing.assert_allclose(refined.confidence, again.confidence, atol=1e-5)
+
+
+def test_a_mask_that_leaves_nothing_out_changes_nothing() -> None:
+    net, initial = network(seed=5), view(outliers=True)
+    flags = np.ones(initial.depth.shape, np.bool_)
+    (source,) = initial.sources
+    masked = dataclasses.replace(
+        initial,
+        wanted=flags,
+        sources=(
+            dataclasses.replace(source, wanted=np.ones(source.gray.shape, np.bool_)),
+        ),
+    )
+    refined, again = (refine_view(it, net, TILES) for it in (initial, masked))
+    np.testing.assert_allclose(refined.depth, again.depth, rtol=1e-6)
+    np.testing.assert_allclose(refined.confidence, again.confidence, atol=1e-6)
+
+
+def test_empty_pixels_are_kept_on_request() -> None:
+    initial = view()
+    config = dataclasses.replace(TILES, keep_empty=True)
+    refined = refine_view(initial, network(seed=5), config)
+    filled = refine_view(initial, network(seed=5), TILES)
+    assert np.array_equal(refined.depth > 0, initial.depth > 0)
+    known = initial.depth > 0
+    np.testing.assert_allclose(refined.depth[known], filled.depth[known], rtol=1e-6)
+    assert not refined.confidence[~known].any()
+
+
+def test_masked_pixels_of_either_view_are_as_outside_of_the_source() -> None:
+    masked, cpu = masked_view(0), torch.device("cpu")
+    assert masked.wanted is not None
+    plain = dataclasses.replace(masked.sources[0], wanted=None)
+    blind = dataclasses.replace(plain, wanted=np.zeros(plain.gray.shape, np.bool_))
+    errors = {}
+    for name, source in (("plain", plain), ("blind", blind), ("half", None)):
+        sources = masked.sources if source is None else (source,)
+        tensors = view_tensors(
+            dataclasses.replace(masked, sources=sources), cpu, use_maps=False
+        )
+        seen = seen_by_sources(tensors, 1)
+        ((image, inside),) = seen.warped
+        assert not inside[0, 0].numpy()[~masked.wanted].any()
+        assert not image[~inside].any()
+        errors[name] = (seen.error[0, 0].numpy(), inside[0, 0].numpy())
+    assert not errors["blind"][1].any()
+    assert (errors["blind"][0] == NO_EVIDENCE).all()
+    hidden = errors["plain"][1] & ~errors["half"][1]
+    assert 0 < hidden.mean() < 0.5
+    assert (errors["half"][0][hidden] == NO_EVIDENCE).all()
+    np.testing.assert_array_equal(errors["half"][1] | hidden, errors["plain"][1])
