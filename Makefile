@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: help demo test test-fast browser check lint types floors fix bench cases clean
+.PHONY: help demo test test-fast browser check lint types floors dead fix bench cases clean
 
 help:  ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -29,7 +29,7 @@ test-fast: $(READY)  ## the suite without its slow tests
 browser:  # the report is tested in a Chromium; those tests skip where there is none
 	@scripts/install_chromium.sh
 
-check: lint types floors test  ## all that must be green
+check: lint types floors dead test  ## all that must be green
 
 lint: $(READY)
 	$(BIN)/ruff check .
@@ -40,6 +40,9 @@ types: $(READY)
 
 floors: $(READY)
 	$(BIN)/lint-imports
+
+dead: $(READY)
+	$(BIN)/vulture
 
 fix: $(READY)  ## what a tool can mend
 	$(BIN)/ruff check --fix .

@@ -136,3 +136,9 @@ def _pair(depth_of, source_camera: Camera) -> Pair:  # type: ignore[no-untyped-d
         source_K=tensor(index_K(source.camera)),
         source_from_reference=tensor(cam_from_cam(source, reference)),
     )
+
+
+def inverse_depth(depth: Tensor) -> Tensor:
+    """Inverse depth, same shape, in 1/unit; 0 stays 0, with gradient 0."""
+    safe = torch.where(depth > 0, depth, 1.0)
+    return torch.where(depth > 0, 1.0 / safe, 0.0)

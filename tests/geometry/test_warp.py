@@ -2,10 +2,9 @@ import dataclasses
 
 import pytest
 import torch
-from analytic_scene import CAMERA, Pair, plane_pair, sphere_pair
+from analytic_scene import CAMERA, Pair, inverse_depth, plane_pair, sphere_pair
 from torch import Tensor
 
-from resdepth_colmap.geometry.inverse_depth import inverse_depth
 from resdepth_colmap.geometry.warp import warp_to_reference
 
 

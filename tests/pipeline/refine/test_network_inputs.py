@@ -5,11 +5,11 @@ import pytest
 import torch
 from analytic_scene import (
     Pair,
+    inverse_depth,
     plane_pair,
     sphere_pair,
 )
 
-from resdepth_colmap.geometry.inverse_depth import inverse_depth
 from resdepth_colmap.network.network_config import (
     BLUE,
     RED,

@@ -1,9 +1,8 @@
 """Laws of the look through the source at any depth."""
 
 import torch
-from analytic_scene import Pair, plane_pair, sphere_pair
+from analytic_scene import Pair, inverse_depth, plane_pair, sphere_pair
 
-from resdepth_colmap.geometry.inverse_depth import inverse_depth
 from resdepth_colmap.pipeline.refine.source_sampler import (
     Sight,
     SourceSampler,
