@@ -71,6 +71,5 @@ def test_the_precision_is_that_of_the_pose_and_of_the_points() -> None:
     pose, xyz = np.eye(3, 4), np.ones((2, 3), np.float32)
     assert transform(pose, xyz).dtype == np.float64
     assert transform(pose.astype(np.float32), xyz).dtype == np.float32
-    for points in (xyz, xyz.astype(np.float64)):
-        xy, z = project(points, K)
-        assert xy.dtype == z.dtype == points.dtype
+    assert project(xyz, K)[0].dtype == np.float32
+    assert project(xyz.astype(np.float64), K)[0].dtype == np.float64
