@@ -1,18 +1,15 @@
 """Images and depth maps at the size that is matched at, the last few of them kept."""
 
-import collections
-from collections.abc import Callable, Hashable
 from pathlib import Path
-from typing import Any, TypeVar
 
 import numpy as np
-import numpy.typing as npt
 
 from resdepth_colmap.geometry.resize import area_resized, nearest_resized
 from resdepth_colmap.io.colmap.depth_map import read_depth_map
 from resdepth_colmap.io.colmap.workspace import Workspace, original_map_path
 from resdepth_colmap.io.images import read_gray, read_unit_colors
 from resdepth_colmap.pipeline.masks import wanted_pixels
+from resdepth_colmap.pipeline.recent_cache import RecentCache
 from resdepth_colmap.scene import (
     Camera,
     DepthMap,
@@ -23,48 +20,6 @@ from resdepth_colmap.scene import (
 )
 
 Size = tuple[int, int]
-Value = TypeVar("Value", bound=np.generic)
-
-
-class ArrayCache:
-    """Keeps the arrays that were asked for last; memory holds so many bytes of them.
-
-    Attributes:
-        max_num_bytes: An array is forgotten when there are more.
-    """
-
-    def __init__(self, max_num_bytes: int) -> None:
-        """Keep nothing yet."""
-        self.max_num_bytes = max_num_bytes
-        self._kept: collections.OrderedDict[Hashable, npt.NDArray[Any]] = (
-            collections.OrderedDict()
-        )
-
-    @property
-    def num_bytes(self) -> int:
-        """Memory of what is kept."""
-        return sum(array.nbytes for array in self._kept.values())
-
-    def get(
-        self, key: Hashable, load: Callable[[], npt.NDArray[Value]]
-    ) -> npt.NDArray[Value]:
-        """What is kept under that key; else what `load` returns, and it is kept."""
-        if key not in self._kept:
-            array = load()
-            self._forget(array.nbytes)
-            if array.nbytes > self.max_num_bytes:
-                return array
-            self._kept[key] = array
-        self._kept.move_to_end(key)
-        return self._kept[key]
-
-    def drop(self, key: Hashable) -> None:
-        """Forget an array: its file has changed."""
-        self._kept.pop(key, None)
-
-    def _forget(self, num_more: int) -> None:
-        while self._kept and self.num_bytes + num_more > self.max_num_bytes:
-            self._kept.popitem(last=False)
 
 
 class ViewImages:
@@ -78,7 +33,7 @@ class ViewImages:
     def __init__(self, workspace: Workspace, max_num_bytes: int) -> None:
         """Keep nothing yet, and up to that many bytes later."""
         self.workspace = workspace
-        self.cache = ArrayCache(max_num_bytes)
+        self.cache = RecentCache(max_num_bytes)
 
     def gray(self, view: View, camera: Camera) -> GrayImage:
         """Grey values of a view in 0..1, at the size of `camera`, float32.

@@ -7,32 +7,7 @@ from planes import NAMES, write_plane_workspace
 
 from resdepth_colmap.io.colmap.workspace import open_workspace
 from resdepth_colmap.io.images import write_png
-from resdepth_colmap.pipeline.view_images import ArrayCache, ViewImages
-from resdepth_colmap.scene import FloatMap
-
-
-def test_a_cache_holds_the_latest_and_no_more_than_it_may() -> None:
-    cache = ArrayCache(100)
-    loaded: list[int] = []
-
-    def get(number: int) -> FloatMap:
-        def load() -> FloatMap:
-            loaded.append(number)
-            return np.full(10, number, np.float32)  # 40 bytes
-
-        return cache.get(number, load)
-
-    for number in (1, 2, 1, 3, 1, 2):
-        assert (get(number) == number).all()
-        assert cache.num_bytes <= 100
-    assert loaded == [1, 2, 3, 2]  # 2 was the one that had not been asked for
-
-
-def test_what_is_larger_than_the_cache_is_loaded_each_time() -> None:
-    cache = ArrayCache(10)
-    first, second = (cache.get(0, lambda: np.zeros(9, np.float32)) for _ in range(2))
-    assert first is not second
-    assert cache.num_bytes == 0
+from resdepth_colmap.pipeline.view_images import ViewImages
 
 
 def test_images_and_maps_come_at_the_size_that_is_asked_for(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from resdepth_colmap.geometry.pixels import index_K
 from resdepth_colmap.geometry.resize import nearest_resized
 from resdepth_colmap.io.colmap.depth_map import read_depth_map
 from resdepth_colmap.pipeline.fuse.views import MapFiles
-from resdepth_colmap.pipeline.view_images import ArrayCache
+from resdepth_colmap.pipeline.recent_cache import RecentCache
 from resdepth_colmap.scene import DepthMap
 
 MAX_NUM_BYTES = 512 << 20
@@ -24,7 +24,7 @@ class MethodMaps(Sequence[ViewMaps]):
         """Read nothing yet; depth below that confidence counts as none."""
         self._methods = methods
         self._min_confidence = min_confidence
-        self._cache = ArrayCache(MAX_NUM_BYTES)
+        self._cache = RecentCache(MAX_NUM_BYTES)
 
     def __len__(self) -> int:
         """The number of views."""

@@ -1,7 +1,6 @@
 """The maps of the views to fuse, read when they are asked for."""
 
 import dataclasses
-from collections import OrderedDict
 from collections.abc import Sequence
 from pathlib import Path
 from typing import overload
@@ -18,6 +17,7 @@ from resdepth_colmap.io.colmap.masks import Masks
 from resdepth_colmap.io.colmap.normal_map import read_normal_map
 from resdepth_colmap.io.images import read_rgb
 from resdepth_colmap.pipeline.masks import masked_depth
+from resdepth_colmap.pipeline.recent_cache import RecentCache
 from resdepth_colmap.scene import (
     ColorImage,
     DepthMap,
@@ -54,7 +54,7 @@ class FuseView:
     confidence: FloatMap | None = None
 
     @property
-    def num_bytes(self) -> int:
+    def nbytes(self) -> int:
         """Memory of the maps."""
         maps = (self.depth, self.normals, self.rgb, self.confidence)
         return sum(values.nbytes for values in maps if values is not None)
@@ -141,8 +141,7 @@ class LazyViews(Sequence[FuseView]):
     def __init__(self, files: Sequence[MapFiles], max_num_bytes: int) -> None:
         """Keep views up to that many bytes in all, but at least one."""
         self._files = files
-        self._max_num_bytes = max_num_bytes
-        self._kept: OrderedDict[int, FuseView] = OrderedDict()
+        self._cache = RecentCache(max_num_bytes)
 
     def __len__(self) -> int:
         """The number of views, read or not."""
@@ -155,16 +154,8 @@ class LazyViews(Sequence[FuseView]):
     def __getitem__(self, index: int | slice) -> FuseView | Sequence[FuseView]:
         """A view; WorkspaceError if it cannot be read."""
         if isinstance(index, slice):
-            return LazyViews(self._files[index], self._max_num_bytes)
-        if index not in self._kept:
-            self._kept[index] = self._files[index].read()
-        self._kept.move_to_end(index)
-        while len(self._kept) > 1 and self._num_bytes() > self._max_num_bytes:
-            self._kept.popitem(last=False)
-        return self._kept[index]
-
-    def _num_bytes(self) -> int:
-        return sum(view.num_bytes for view in self._kept.values())
+            return LazyViews(self._files[index], self._cache.max_num_bytes)
+        return self._cache.get(index, self._files[index].read)
 
 
 def _check_size(

@@ -221,7 +221,7 @@ def test_lazy_views_keep_no_more_than_they_may(tmp_path: Path) -> None:
         )
         for view in scene.views
     ]
-    one = files[0].read().num_bytes
+    one = files[0].read().nbytes
     views = LazyViews(files, 2 * one)
     first = views[0]
     assert views[1] is views[1] and views[0] is first
