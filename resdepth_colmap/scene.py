@@ -1,7 +1,6 @@
 """What a scene is: cameras, views, and what the views share. No files, no torch."""
 
 import dataclasses
-import math
 from typing import Protocol
 
 import numpy as np
@@ -150,9 +149,3 @@ class Scene:
             if view.name == name:
                 return index
         return -1
-
-
-def diagonal_fov_deg(camera: Camera) -> float:
-    """Angle between the rays of opposite image corners, in degrees."""
-    half = 0.5 * math.hypot(camera.width_px / camera.fx, camera.height_px / camera.fy)
-    return math.degrees(2.0 * math.atan(half))

@@ -92,6 +92,12 @@ class Pair:
     source_K: Tensor  # noqa: N815
     source_from_reference: Tensor
 
+    @property
+    def inverse_depth(self) -> Tensor:
+        """Inverse depth of the reference; 0 = no depth."""
+        valid = self.depth > 0
+        return torch.where(valid, 1 / torch.where(valid, self.depth, 1.0), 0.0)
+
 
 def tensor(values: Matrix | FloatMap) -> Tensor:
     """Double, with a leading batch axis (and a channel axis for a map)."""

@@ -74,17 +74,8 @@ def write_patch_match_cfg(path: Path, sources: Mapping[str, SourceSpec]) -> None
     _write_lines(path, lines)
 
 
-def read_fusion_cfg(path: Path) -> tuple[str, ...]:
-    """Read a `fusion.cfg`: the names of the images to fuse, one a line.
-
-    Raises:
-        WorkspaceError: If the file is not there or no text.
-    """
-    return tuple(name for _, name in _lines(path))
-
-
 def write_fusion_cfg(path: Path, names: Sequence[str]) -> None:
-    """Write a `fusion.cfg`, whole or not at all.
+    """Write a `fusion.cfg`, the images to fuse, one a line, whole or not at all.
 
     Raises:
         WorkspaceError: If the file cannot be written, or a name cannot stand in it.

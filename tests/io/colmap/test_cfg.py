@@ -8,7 +8,6 @@ from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.io.colmap.cfg import (
     SourceKind,
     SourceSpec,
-    read_fusion_cfg,
     read_sources,
     write_fusion_cfg,
     write_patch_match_cfg,
@@ -32,7 +31,7 @@ def test_what_is_written_is_read(
     write_patch_match_cfg(path, sources)
     assert read_sources(path) == sources
     write_fusion_cfg(path, list(sources))
-    assert read_fusion_cfg(path) == tuple(sources)
+    assert path.read_text("utf-8") == "".join(f"{name}\n" for name in sources)
 
 
 def test_comments_blank_lines_and_windows_line_ends_are_skipped(tmp_path: Path) -> None:
@@ -79,12 +78,12 @@ def test_a_malformed_line_is_named(tmp_path: Path, content: str, line: int) -> N
 
 
 def test_a_file_that_is_no_text_or_not_there_is_named(tmp_path: Path) -> None:
-    path = tmp_path / "fusion.cfg"
-    with pytest.raises(WorkspaceError, match=r"fusion\.cfg"):
-        read_fusion_cfg(path)
+    path = tmp_path / "patch-match.cfg"
+    with pytest.raises(WorkspaceError, match=r"patch-match\.cfg"):
+        read_sources(path)
     path.write_bytes(b"a.png\n\xff\xfe\n")
-    with pytest.raises(WorkspaceError, match=r"fusion\.cfg, line 2"):
-        read_fusion_cfg(path)
+    with pytest.raises(WorkspaceError, match=r"patch-match\.cfg, line 2"):
+        read_sources(path)
 
 
 @pytest.mark.parametrize("name", ["", " a.png", "#a.png", "a\nb.png"])

@@ -9,7 +9,6 @@ from analytic_scene import (
     sphere_pair,
 )
 
-from resdepth_colmap.geometry.inverse_depth import inverse_depth
 from resdepth_colmap.network.network_config import (
     BLUE,
     RED,
@@ -37,7 +36,7 @@ def view_of(pair: Pair, num_sources: int = 1, scale: float = 1.0) -> ViewTensors
     pose[..., 3] *= scale
     source = SourceTensors(pair.source_gray, pair.source_K, pose)
     return ViewTensors(
-        inverse_depth=inverse_depth(pair.depth * scale),
+        inverse_depth=pair.inverse_depth / scale,
         valid=pair.depth > 0,
         gray=pair.reference_gray,
         K=pair.reference_K,
