@@ -92,6 +92,12 @@ class Pair:
     source_K: Tensor  # noqa: N815
     source_from_reference: Tensor
 
+    @property
+    def inverse_depth(self) -> Tensor:
+        """Inverse depth of the reference; 0 = no depth."""
+        valid = self.depth > 0
+        return torch.where(valid, 1 / torch.where(valid, self.depth, 1.0), 0.0)
+
 
 def tensor(values: Matrix | FloatMap) -> Tensor:
     """Double, with a leading batch axis (and a channel axis for a map)."""
@@ -136,9 +142,3 @@ def _pair(depth_of, source_camera: Camera) -> Pair:  # type: ignore[no-untyped-d
         source_K=tensor(index_K(source.camera)),
         source_from_reference=tensor(cam_from_cam(source, reference)),
     )
-
-
-def inverse_depth(depth: Tensor) -> Tensor:
-    """Inverse depth, same shape, in 1/unit; 0 stays 0, with gradient 0."""
-    safe = torch.where(depth > 0, depth, 1.0)
-    return torch.where(depth > 0, 1.0 / safe, 0.0)

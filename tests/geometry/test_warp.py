@@ -2,7 +2,7 @@ import dataclasses
 
 import pytest
 import torch
-from analytic_scene import CAMERA, Pair, inverse_depth, plane_pair, sphere_pair
+from analytic_scene import CAMERA, Pair, plane_pair, sphere_pair
 from torch import Tensor
 
 from resdepth_colmap.geometry.warp import warp_to_reference
@@ -11,7 +11,7 @@ from resdepth_colmap.geometry.warp import warp_to_reference
 def warp(pair: Pair) -> tuple[Tensor, Tensor]:
     warped, inside = warp_to_reference(
         pair.source_gray,
-        inverse_depth(pair.depth),
+        pair.inverse_depth,
         pair.reference_K,
         pair.source_K,
         pair.source_from_reference,
@@ -65,7 +65,7 @@ def test_the_identity_pose_changes_nothing(dtype: torch.dtype) -> None:
     image = pair.source_gray.to(dtype)
     same = torch.eye(3, 4)[None].double()
     warped, inside = warp_to_reference(
-        image, inverse_depth(pair.depth).to(dtype), pair.source_K, pair.source_K, same
+        image, pair.inverse_depth.to(dtype), pair.source_K, pair.source_K, same
     )
     assert inside.all()
     torch.testing.assert_close(warped, image, rtol=0, atol=1e-5)
@@ -121,7 +121,7 @@ def test_each_view_of_a_batch_has_its_own_geometry() -> None:
 def test_the_gradient_is_that_of_finite_differences() -> None:
     pair = plane_pair()
     window = slice(20, 25)
-    inverse = inverse_depth(pair.depth)[..., window, window].clone().requires_grad_()
+    inverse = pair.inverse_depth[..., window, window].clone().requires_grad_()
     image = pair.source_gray.clone().requires_grad_()
 
     def sample(inverse: Tensor, image: Tensor) -> Tensor:

@@ -5,7 +5,6 @@ import pytest
 import torch
 from analytic_scene import (
     Pair,
-    inverse_depth,
     plane_pair,
     sphere_pair,
 )
@@ -37,7 +36,7 @@ def view_of(pair: Pair, num_sources: int = 1, scale: float = 1.0) -> ViewTensors
     pose[..., 3] *= scale
     source = SourceTensors(pair.source_gray, pair.source_K, pose)
     return ViewTensors(
-        inverse_depth=inverse_depth(pair.depth * scale),
+        inverse_depth=pair.inverse_depth / scale,
         valid=pair.depth > 0,
         gray=pair.reference_gray,
         K=pair.reference_K,

@@ -1,7 +1,7 @@
 """Laws of the look through the source at any depth."""
 
 import torch
-from analytic_scene import Pair, inverse_depth, plane_pair, sphere_pair
+from analytic_scene import Pair, plane_pair, sphere_pair
 
 from resdepth_colmap.pipeline.refine.source_sampler import (
     Sight,
@@ -17,7 +17,7 @@ def sight_of(pair: Pair) -> Sight:
 
 def test_at_the_true_depth_the_source_shows_what_the_reference_shows() -> None:
     for pair in (plane_pair(), sphere_pair()):
-        truth = inverse_depth(pair.depth)[0]
+        truth = pair.inverse_depth[0]
         depths = torch.cat([truth, truth * 1.2, truth * 0.0])
         right, wrong, nothing = sight_of(pair).gray_at(depths)
         seen = (right > 0) & (truth[0] > 0)
@@ -29,7 +29,7 @@ def test_at_the_true_depth_the_source_shows_what_the_reference_shows() -> None:
 
 def test_a_window_shows_the_same_as_the_whole() -> None:
     pair = plane_pair()
-    depths = inverse_depth(pair.depth)
+    depths = pair.inverse_depth
     sample_source = SourceSampler((sight_of(pair),))
     whole = sample_source.gray_at(depths)
     window = (..., slice(7, 30), slice(11, 50))
@@ -39,7 +39,7 @@ def test_a_window_shows_the_same_as_the_whole() -> None:
 
 def test_each_tile_has_its_own_source_or_none() -> None:
     plane, sphere = plane_pair(), sphere_pair()
-    depths = torch.cat([inverse_depth(pair.depth) for pair in (plane, plane, sphere)])
+    depths = torch.cat([pair.inverse_depth for pair in (plane, plane, sphere)])
     sample_source = SourceSampler((sight_of(plane), None, sight_of(sphere)))
     both = sample_source.gray_at(depths)
     assert torch.equal(both[0], sight_of(plane).gray_at(depths[0]))
