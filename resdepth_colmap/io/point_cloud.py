@@ -95,6 +95,12 @@ def write_cloud(path: Path, cloud: PointCloud) -> None:
             "allow larger errors (--max-depth-error, --max-reproj-error), or refine "
             "more images."
         )
+    is_far = cloud.points.dtype == np.float64
+    if is_far and path.suffix.lower() == ".pcd":
+        raise ConfigError(
+            f"{path}: the cloud is too far from its origin for a .pcd, which readers "
+            "take in single precision alone; use .ply or .xyz."
+        )
     open3d = load_open3d()
 
     points, colors, normals = (
@@ -108,6 +114,9 @@ def write_cloud(path: Path, cloud: PointCloud) -> None:
     tensor_cloud = open3d.t.geometry.PointCloud(points)
     tensor_cloud.point.colors, tensor_cloud.point.normals = colors, normals
     with whole_file(path) as partial:
+        if is_far and path.suffix.lower() == ".xyz":  # open3d writes no doubles there
+            np.savetxt(partial, cloud.points, fmt="%.6f")
+            return
         with _quiet(open3d):
             is_written = open3d.t.io.write_point_cloud(partial, tensor_cloud)
         if not is_written:

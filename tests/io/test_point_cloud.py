@@ -3,6 +3,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import open3d
 import pytest
 
 from resdepth_colmap.errors import ConfigError, FusionError, WorkspaceError
@@ -64,6 +65,21 @@ def test_xyz_holds_the_coordinates(tmp_path: Path) -> None:
     cloud = _cloud(5)
     write_cloud(tmp_path / "fused.xyz", cloud)
     np.testing.assert_allclose(np.loadtxt(tmp_path / "fused.xyz"), cloud.points, 1e-6)
+
+
+@pytest.mark.parametrize("suffix", ["ply", "xyz"])
+def test_a_cloud_far_from_the_origin_keeps_its_shape(
+    tmp_path: Path, suffix: str
+) -> None:
+    offset = np.array([500000.0, 4500000.0, 100.0])
+    cloud = _cloud(50).moved(offset)
+    assert cloud.points.dtype == np.float64
+    path = tmp_path / f"far.{suffix}"
+    write_cloud(path, cloud)
+    found = np.asarray(open3d.io.read_point_cloud(str(path)).points)
+    np.testing.assert_allclose(found - offset, _cloud(50).points, atol=2e-6)
+    with pytest.raises(ConfigError, match=r"use \.ply or \.xyz"):
+        write_cloud(tmp_path / "far.pcd", cloud)
 
 
 def test_an_extension_in_capitals_is_known(tmp_path: Path) -> None:
