@@ -125,6 +125,12 @@ class Manifest:
         entry = self._entries.get((task.stage, task.name))
         return dict(entry.facts) if entry else {}
 
+    def written_digest(self, path: Path) -> str | None:
+        """Digest of a file as it was written; None: it is not known as a result."""
+        name = self.fingerprints.relative(path)
+        digests = (entry.files.get(name) for entry in self._entries.values())
+        return next((digest for digest in digests if digest is not None), None)
+
     def start(self, task: Task, facts: Mapping[str, Any] | None = None) -> None:
         """A result is about to be written: nothing vouches for its files any more."""
         self._add(task, Entry(key=IN_PROGRESS, files={}, facts=dict(facts or {})))
@@ -217,7 +223,9 @@ def _lines(path: Path) -> list[dict[str, Any]]:
         return []
     except OSError as error:
         reason = error.strerror or str(error)
-        raise WorkspaceError(f"{path}: cannot read it ({reason}).") from error
+        raise WorkspaceError(
+            f"{path}: cannot read it ({reason}); delete it, and all is made again."
+        ) from error
     found = []
     for line in text.splitlines():
         try:
@@ -234,11 +242,14 @@ def _entry(line: Mapping[str, Any]) -> Entry | None:
     files, facts = line.get("files"), line.get("facts")
     if not (strings and isinstance(files, dict) and isinstance(facts, dict)):
         return None
-    return Entry(key=line["key"], files=files, facts=facts)
+    entry = Entry(key=line["key"], files=files, facts=facts)
+    is_whole = line == _line(line["stage"], line["name"], entry)
+    return entry if is_whole else None  # damaged, or of another version
 
 
 def _line(stage: str, name: str, entry: Entry) -> dict[str, Any]:
-    return {"stage": stage, "name": name, **dataclasses.asdict(entry)}
+    line = {"stage": stage, "name": name, **dataclasses.asdict(entry)}
+    return {**line, "check": key_of(line)[:16]}
 
 
 def _text(lines: Iterable[Mapping[str, Any]]) -> bytes:

@@ -7,19 +7,25 @@ of its maps: what was masked once stays so in the commands that follow.
 import dataclasses
 import logging
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from resdepth_colmap.config import MaskConfig
 from resdepth_colmap.geometry.resize import nearest_resized
-from resdepth_colmap.io.colmap.masks import Masks, check_masks, find_mask_folder
+from resdepth_colmap.io.colmap.masks import (
+    FOLDER_NAME,
+    Masks,
+    check_masks,
+    find_mask_folder,
+)
 from resdepth_colmap.io.colmap.output import (
     BACKDROP_FOLDER,
     OutputWorkspace,
     read_record,
 )
-from resdepth_colmap.io.colmap.workspace import Workspace
+from resdepth_colmap.io.colmap.workspace import OUTPUT_FOLDER, Workspace
 from resdepth_colmap.pipeline.manifest import Manifest
 from resdepth_colmap.scene import DepthMap, Scene, Wanted
 
@@ -152,11 +158,23 @@ def _recorded(workspace: Workspace, after_run: bool) -> MaskConfig | None:
     for facts in _noted(workspace, record):
         folder, alpha = facts.get("folder"), facts.get("alpha") is True
         path = workspace.path / folder if isinstance(folder, str) else None
-        if path is not None and path.name == BACKDROP_FOLDER and not path.is_dir():
-            continue  # the output was deleted; `refine` makes them again
+        if path is not None and _is_gone(workspace, path):
+            continue
         if path is not None or alpha:
             return MaskConfig(mask_path=path, alpha_masks=alpha)
     return None
+
+
+def _is_gone(workspace: Workspace, folder: Path) -> bool:
+    """Whether masks that nobody has named are not there any more.
+
+    Those of a backdrop are made again; `masks/` beside the images is found or not.
+    """
+    is_found = folder in (
+        workspace.path / FOLDER_NAME,
+        workspace.path / OUTPUT_FOLDER / BACKDROP_FOLDER,
+    )
+    return is_found and not (folder.is_dir() and any(folder.iterdir()))
 
 
 def _noted(

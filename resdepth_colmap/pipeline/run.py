@@ -24,6 +24,7 @@ from resdepth_colmap.io.colmap.output import (
 from resdepth_colmap.io.colmap.workspace import check_images, open_workspace
 from resdepth_colmap.pipeline.backdrop import backdrop_masks
 from resdepth_colmap.pipeline.fuse.to_file import Clouds, cloud_path
+from resdepth_colmap.pipeline.in_place import adopt_new_maps
 from resdepth_colmap.pipeline.masks import mask_facts, with_masks
 from resdepth_colmap.pipeline.refine.stage import (
     Network,
@@ -92,6 +93,7 @@ def run_refine(
     workspace = with_masks(workspace, scene, config.masks)
     network = load_network(config.refine)
     output = OutputWorkspace(source=workspace, in_place=config.in_place)
+    adopt_new_maps(output, scene)
     output.prepare([view.name for view in scene.views])
     output = _without_backdrop(output, scene, config)
     run = _Run(scene, config, output, network, progress or SilentProgress())

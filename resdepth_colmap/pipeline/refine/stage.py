@@ -15,6 +15,7 @@ from resdepth_colmap.network.inference import for_inference
 from resdepth_colmap.network.network_config import NetworkConfig
 from resdepth_colmap.network.unet import ResDepthNet
 from resdepth_colmap.network.weights import load_weights, weights_hash
+from resdepth_colmap.pipeline.in_place import adopt_new_maps
 from resdepth_colmap.pipeline.initial_map import check_maps_exist
 from resdepth_colmap.pipeline.manifest import Manifest
 from resdepth_colmap.pipeline.masks import with_masks
@@ -117,6 +118,7 @@ def refine_workspace(
     workspace = with_masks(workspace, scene, masks or MaskConfig())
     network = load_network(config)
     output = OutputWorkspace(source=workspace, in_place=in_place)
+    adopt_new_maps(output, scene)
     output.prepare([view.name for view in scene.views])
     return refine_views(
         output, scene, config, network, overwrite, progress or SilentProgress()
