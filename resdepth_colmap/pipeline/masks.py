@@ -36,9 +36,14 @@ _STEREO = "stereo"  # the stage, whose results lie in a folder of the same name
 
 
 def with_masks(
-    workspace: Workspace, scene: Scene, config: MaskConfig, *, after_run: bool = False
+    workspace: Workspace,
+    scene: Scene,
+    config: MaskConfig,
+    *,
+    after_run: bool = False,
+    log: bool = True,
 ) -> Workspace:
-    """The workspace with its masks, which are checked; what is used is logged.
+    """The workspace with its masks, which are checked.
 
     Args:
         workspace: The workspace.
@@ -46,21 +51,19 @@ def with_masks(
         config: The masks asked for.
         after_run: The command uses what a run has made: masks that this left out are
             left out, too.
+        log: Log what is used, and which images have no mask.
 
     Raises:
         WorkspaceError: If there are no such masks, or one does not fit its image.
     """
     masks = find_masks(workspace, config, after_run=after_run)
     without = unmasked_images(masks, scene)
-    if masks.are_used:
-        num_masked = len(scene.views) - len(without)
-        logger.info(
-            "Masks: %s (%d of %d images).",
-            said_masks(masks),
-            num_masked,
-            len(scene.views),
-        )
-    if without:
+    if masks.are_used and log:
+        num_views = len(scene.views)
+        num_masked = num_views - len(without)
+        words = "Masks: %s (%d of %d images)."
+        logger.info(words, said_masks(masks), num_masked, num_views)
+    if without and log:
         logger.warning("%s.", said_unmasked(without))
     return dataclasses.replace(workspace, masks=masks)
 

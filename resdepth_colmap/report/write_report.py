@@ -62,7 +62,8 @@ def write_report(
     """
     workspace = open_workspace(path)
     scene = read_scene(workspace.sparse_path, workspace.images_path, workspace.path)
-    workspace = with_masks(workspace, scene, masks or MaskConfig(), after_run=True)
+    asked, log = masks or MaskConfig(), masks is not None
+    workspace = with_masks(workspace, scene, asked, after_run=True, log=log)
     record = read_record(OutputWorkspace(source=workspace).record_path)
     options = record.get("options")
     in_place = isinstance(options, dict) and options.get("in_place") is True

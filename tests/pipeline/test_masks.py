@@ -207,6 +207,9 @@ def test_images_without_a_mask_are_said_once(
     assert line.startswith("4 images have no mask")
     assert ", ".join(NAMES[1:4]) + " and 1 more" in line
     assert maps_of(folder, NAMES[1])["depth_maps"].all()
+    weights = identity_weights(tmp_path)
+    options = ("--mask-path", masks, "--weights", weights, "--overwrite")
+    assert run("refine", folder, *options).stderr.count("no mask") == 1
 
 
 def test_a_changed_mask_means_again_for_whoever_looks_at_it(tmp_path: Path) -> None:
