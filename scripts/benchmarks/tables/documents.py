@@ -10,7 +10,14 @@ from typing import Any, NamedTuple
 
 from resdepth_colmap.evaluation.markdown import Column, Measured, table
 from scripts.benchmarks.record import read
-from scripts.benchmarks.tables import compare, costs, depth, matching, variants
+from scripts.benchmarks.tables import (
+    cases,
+    compare,
+    costs,
+    depth,
+    matching,
+    variants,
+)
 from scripts.benchmarks.tables.model_card import short_hash, training_text, weights_text
 
 WIDTH = 160
@@ -76,6 +83,7 @@ DOCUMENTS: dict[str, dict[str, Block]] = {
             ["agreement", "matching"], matching.NEAR_COLMAP, matching.near_colmap_rows
         ),
         "workspaces": block(["workspaces"], costs.WORKSPACES, costs.workspace_rows),
+        "cases": block(["cases"], cases.CASES, cases.case_rows),
         "clouds": block(["compare"], compare.CLOUDS, compare.cloud_rows),
         "paired": block(["compare"], compare.PAIRED, compare.paired_rows),
         "matching": block(["matching"], matching.TRUTH, matching.truth_rows),
