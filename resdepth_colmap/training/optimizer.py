@@ -1,4 +1,4 @@
-"""One optimiser step, and all that changes by it."""
+"""One optimiser step: loss, gradients, new weights."""
 
 import dataclasses
 import math
@@ -28,12 +28,11 @@ class Optimisation:
     """A network in training.
 
     Attributes:
-        network: The network itself, for validation and for the weights file.
-        model: What is called in a step: the network, or what joins it with those of the
-            other processes.
-        optimiser: Holds the moments of the gradients.
-        schedule: Of the learning rate, a value a step.
-        config: How to train.
+        network: The network, for validation and for the weights file.
+        model: The module called in a step: the network, or its distributed wrapper.
+        optimiser: The optimiser, with the moments of the gradients.
+        schedule: Learning rate of each step.
+        config: Options of the training.
         ranks: The processes.
     """
 
@@ -74,22 +73,22 @@ class Optimisation:
 
     @property
     def learning_rate(self) -> float:
-        """That of the next step."""
+        """Learning rate of the next step."""
         return float(self.optimiser.param_groups[0]["lr"])
 
     def step(self, batch: Batch, wants_stop: bool = False) -> tuple[float, bool]:
         """Take a step.
 
         Args:
-            batch: The part of this process.
-            wants_stop: Whether this process was asked to stop.
+            batch: The part of the batch of this process.
+            wants_stop: Whether this process is to stop.
 
         Returns:
-            The loss over the whole batch; and whether any process was asked to stop.
+            The loss over the batch of all processes; and whether any is to stop.
 
         Raises:
-            TrainingError: If loss or gradients are not finite; nothing has changed but
-                the running statistics of the norms.
+            TrainingError: If loss or gradients are not finite. Only the running
+                statistics of the norms have changed then.
         """
         self.model.train()
         _freeze(self.network, self.config)
@@ -104,7 +103,7 @@ class Optimisation:
         value = total / max(num_known, 1.0)
         self._check_finite("loss", value, batch)
         self.optimiser.zero_grad(set_to_none=True)
-        # The processes' gradients are averaged: count makes a sum of it again.
+        # The gradients are averaged over the processes: times count, they are summed.
         mean = loss.total * (self.ranks.count / max(num_known, 1.0))
         mean.backward()  # type: ignore[no-untyped-call] # torch's own
         limit = self.config.largest_gradient or math.inf
@@ -115,7 +114,7 @@ class Optimisation:
         return value, num_stops > 0
 
     def _refined(self, inputs: Tensor, sample_source: SampleSource) -> Refinement:
-        """The network's output in single precision, whatever it computed with."""
+        """The network's output in single precision, whatever the precision inside."""
         halved = self.config.precision is Precision.BFLOAT16
         with torch.autocast(inputs.device.type, torch.bfloat16, enabled=halved):
             inverse_depth, log_scale = self.model(inputs, sample_source)
@@ -131,7 +130,7 @@ class Optimisation:
 
 
 def _freeze(network: ResDepthNet, config: TrainConfig) -> None:
-    """What is not to be trained gets no gradients, and keeps its running statistics."""
+    """Frozen parts get no gradients and keep their running statistics."""
     for module in network.modules():
         if config.freeze_norms and isinstance(module, nn.BatchNorm2d):
             module.eval()
