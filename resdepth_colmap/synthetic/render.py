@@ -83,17 +83,14 @@ class Tracer:
         columns = (mesh.normals, mesh.uv, self._bake_occlusion())
         self._attributes = np.column_stack(columns).astype(np.float32)
         self._atlas = Atlas(room.textures)
-        self._texture = np.array([kind.texture for kind in room.materials])
-        self._tint = self._of_materials("tint")
-        self._span = self._of_materials("span")
-        self._offset = self._of_materials("offset")
-        self._gloss = self._of_materials("gloss")
-        self._shininess = self._of_materials("shininess")
-        self._emission = self._of_materials("emission")
-
-    def _of_materials(self, name: str) -> Floats:
-        values = [getattr(material, name) for material in self.room.materials]
-        return np.array(values, dtype=np.float32)
+        kinds = room.materials
+        self._texture = np.array([kind.texture for kind in kinds])
+        self._tint = np.array([kind.tint for kind in kinds], np.float32)
+        self._span = np.array([kind.span for kind in kinds], np.float32)
+        self._offset = np.array([kind.offset for kind in kinds], np.float32)
+        self._gloss = np.array([kind.gloss for kind in kinds], np.float32)
+        self._shininess = np.array([kind.shininess for kind in kinds], np.float32)
+        self._emission = np.array([kind.emission for kind in kinds], np.float32)
 
     def depth(self, view: View) -> DepthMap:
         """Exact depth at the pixel centres, along the optical axis; 0 = no hit."""

@@ -20,15 +20,13 @@ from resdepth_colmap.io.colmap.cfg import (
 )
 from resdepth_colmap.io.colmap.maps import write_depth_map
 from resdepth_colmap.io.images import write_png
+from resdepth_colmap.progress import Progress, SilentProgress
 from resdepth_colmap.scene import ColorImage, DepthMap, View
 from resdepth_colmap.synthetic.render import Tracer
 from resdepth_colmap.synthetic.room import Style, build_room
 from resdepth_colmap.synthetic.sensor import Sensor
 from resdepth_colmap.synthetic.sparse_points import SparsePoints, sample_points
 from resdepth_colmap.synthetic.viewpoints import choose_views
-
-Progress = Callable[[int, int], None]
-"""Called after each scene with the number of finished scenes and of all."""
 
 _TABLE_SHARE = 0.5
 _STREAM = 20200614  # a random stream apart from other uses of the seed
@@ -147,7 +145,7 @@ def _reconstruction(scene: RenderedScene) -> pycolmap.Reconstruction:
 def synthesize(
     output: Path,
     config: SynthesisConfig,
-    on_progress: Progress | None = None,
+    progress: Progress | None = None,
     num_workers: int = 1,
 ) -> list[Path]:
     """Render rooms into workspaces `output`/room_<seed>; finished ones are kept.
@@ -155,7 +153,7 @@ def synthesize(
     Args:
         output: Folder of the workspaces.
         config: Number of rooms, first seed, number and size of the views.
-        on_progress: Called after each room.
+        progress: Advances with each room.
         num_workers: Number of processes.
 
     Returns:
@@ -165,11 +163,12 @@ def synthesize(
         WorkspaceError: If a file cannot be written.
     """
     seeds = range(config.seed, config.seed + config.num_scenes)
+    render = partial(_render_into, output, config)
     paths = []
-    for path in _run(partial(_render_into, output, config), seeds, num_workers):
-        paths.append(path)
-        if on_progress is not None:
-            on_progress(len(paths), len(seeds))
+    with (progress or SilentProgress()).stage("Rendering", len(seeds)) as advance:
+        for path in _run(render, seeds, num_workers):
+            paths.append(path)
+            advance(1.0)
     return paths
 
 
