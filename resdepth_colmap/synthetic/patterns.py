@@ -1,6 +1,7 @@
 """Textures of repeated patterns: tiles, bricks, stripes, weaves, wallpaper."""
 
 import numpy as np
+import numpy.typing as npt
 
 from resdepth_colmap.synthetic.textures import (
     RICH,
@@ -31,14 +32,15 @@ def _dirty(rng: Rng, picture: Picture) -> Picture:
     return np.asarray(picture * (1 + rng.uniform(0.005, 0.06) * noise[..., None]))
 
 
-def _mix(colors: Picture, share: Field) -> Picture:
+def _mix(colors: Picture, share: npt.ArrayLike) -> Picture:
     s = np.asarray(share, np.float32)[..., None]
     return np.asarray(colors[0] * (1 - s) + colors[1] * s, np.float32)
 
 
 def _tone_per_cell(rng: Rng, size: int, count: int) -> Field:
     tones = 1 + rng.uniform(0, 0.12) * rng.standard_normal((count, count))
-    return np.kron(tones.astype(np.float32), np.ones((size // count,) * 2, np.float32))
+    cell = np.ones((size // count, size // count), np.float32)
+    return np.asarray(np.kron(tones.astype(np.float32), cell))
 
 
 def _tiles(rng: Rng, size: int) -> Picture:
@@ -70,9 +72,8 @@ def _checks(rng: Rng, size: int) -> Picture:
 def _stripes(rng: Rng, size: int) -> Picture:
     x, _, _ = _cells(rng, size, 2, 6)
     edges = np.sort(rng.uniform(0, 1, 4))
-    share = np.digitize(x, edges) % 2
-    if rng.random() < 0.3:
-        share = 0.5 + 0.5 * np.sin(2 * np.pi * x)
+    is_sharp = rng.random() >= 0.3
+    share = np.digitize(x, edges) % 2 if is_sharp else 0.5 + 0.5 * np.sin(2 * np.pi * x)
     picture = _mix(palette(rng, 2), share)
     if rng.random() < 0.5:
         picture = picture.transpose(1, 0, 2)

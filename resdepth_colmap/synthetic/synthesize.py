@@ -11,14 +11,9 @@ import numpy as np
 import pycolmap
 
 from resdepth_colmap.config import SynthesisConfig
-from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.io.colmap.cfg import (
-    SourceKind,
-    SourceSpec,
-    write_fusion_cfg,
-    write_patch_match_cfg,
-)
+from resdepth_colmap.io.colmap import cfg
 from resdepth_colmap.io.colmap.maps import write_depth_map
+from resdepth_colmap.io.colmap.output import make_folder
 from resdepth_colmap.io.images import write_png
 from resdepth_colmap.progress import Progress, SilentProgress
 from resdepth_colmap.scene import ColorImage, DepthMap, View
@@ -89,26 +84,18 @@ def write_scene(path: Path, scene: RenderedScene) -> None:
     Raises:
         WorkspaceError: If a file cannot be written.
     """
-    _make_folders(path)
+    for folder in ("depth_maps", "normal_maps", "consistency_graphs"):
+        make_folder(path / "stereo" / folder)
+    make_folder(path / "sparse")
     for view, image, depth in zip(scene.views, scene.images, scene.depths, strict=True):
         write_png(path / "images" / view.name, image)
         write_depth_map(path / "ground_truth" / f"{view.name}.bin", depth)
     names = [view.name for view in scene.views]
-    sources = dict.fromkeys(names, SourceSpec(kind=SourceKind.AUTO, num_auto=20))
-    write_patch_match_cfg(path / "stereo" / "patch-match.cfg", sources)
-    write_fusion_cfg(path / "stereo" / "fusion.cfg", names)
+    automatic = cfg.SourceSpec(kind=cfg.SourceKind.AUTO, num_auto=20)
+    sources = dict.fromkeys(names, automatic)
+    cfg.write_patch_match_cfg(path / "stereo" / "patch-match.cfg", sources)
+    cfg.write_fusion_cfg(path / "stereo" / "fusion.cfg", names)
     _reconstruction(scene).write(path / "sparse")
-
-
-def _make_folders(path: Path) -> None:
-    stereo = ("stereo/depth_maps", "stereo/normal_maps", "stereo/consistency_graphs")
-    try:
-        for folder in ("images", "sparse", "ground_truth", *stereo):
-            (path / folder).mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise WorkspaceError(
-            f"{path}: cannot make this folder ({error.strerror}); choose another one."
-        ) from error
 
 
 def _reconstruction(scene: RenderedScene) -> pycolmap.Reconstruction:

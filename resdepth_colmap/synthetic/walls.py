@@ -65,9 +65,9 @@ def _open_wall(
     bottom = float(rng.choice([_SKIRTING, 0.3 * height]))
     top = rng.uniform(0.7, 0.9) * height
     back = -inward * rng.uniform(0.08, 0.6)
-    spans = ((0, left, 0, height), (right, length, 0, height))
-    spans += ((left, right, top, height), (left, right, 0, bottom))
-    panels = [_panel(span, corner, direction) for span in spans]
+    beside = [(0.0, left, 0.0, height), (right, length, 0.0, height)]
+    between = [(left, right, top, height), (left, right, 0.0, bottom)]
+    panels = [_panel(span, corner, direction) for span in beside + between]
     start = corner + left * direction + bottom * _UP
     wide, tall = (right - left) * direction, (top - bottom) * _UP
     pane = meshes.rectangle(start + back, wide, tall, _CELL)

@@ -12,14 +12,7 @@ from resdepth_colmap.errors import TrainingError
 from resdepth_colmap.io.images import write_png
 from resdepth_colmap.network.network_config import NetworkConfig
 from resdepth_colmap.progress import Advance, Progress, SilentProgress
-from resdepth_colmap.training.checkpoint import (
-    BEST_NAME,
-    STATE_NAME,
-    WEIGHTS_NAME,
-    load_state,
-    save_best,
-    save_state,
-)
+from resdepth_colmap.training import checkpoint
 from resdepth_colmap.training.config import TrainConfig
 from resdepth_colmap.training.curves import draw_curves
 from resdepth_colmap.training.data.batches import Batch
@@ -80,14 +73,14 @@ def train(
         folders = Folders(workspaces, validate_on, output)
         data = prepare_data(folders, network_config, config, ranks, progress)
         torch.backends.cudnn.deterministic = True  # resumable to the bit on GPUs too
-        run = Optimisation.start(network, config, ranks)
+        run = Optimisation(network, config, ranks)
         with (
             stop_request() as stop,
             progress.stage("Training", config.steps) as advance,
         ):
             _Loop(run, data, output, stop).run(advance)
-    best = output / BEST_NAME
-    return best if best.is_file() else output / WEIGHTS_NAME
+    best = output / checkpoint.BEST_NAME
+    return best if best.is_file() else output / checkpoint.WEIGHTS_NAME
 
 
 class _Loop:
@@ -101,7 +94,7 @@ class _Loop:
         self.data = data
         self.output = output
         self.stop = stop
-        self.position = load_state(output, optimisation)
+        self.position = checkpoint.load_state(output, optimisation)
         self._check_samples()
         self.log: TrainingLog | None = None
 
@@ -147,7 +140,7 @@ class _Loop:
                 if self._report(self.log, now - start):
                     start = time.perf_counter()
                 if wants_stop or self._is_due(self.config.checkpoint_steps):
-                    save_state(self.output, self.optimisation, self.position)
+                    checkpoint.save_state(self.output, self.optimisation, self.position)
             if wants_stop:
                 raise KeyboardInterrupt
             if self._is_due(self.config.validation_steps):
@@ -157,7 +150,7 @@ class _Loop:
         try:
             return self.optimisation.step(batch, self.stop.is_made)
         except TrainingError as error:
-            state = self.output / STATE_NAME
+            state = self.output / checkpoint.STATE_NAME
             kept = f"{state} is the last good state" if state.exists() else "not saved"
             raise TrainingError(
                 f"step {self.position.step}: {error}; {kept}. Check the depth maps of "
@@ -205,5 +198,5 @@ class _Loop:
                 log.add_picture(name, strip, step)
         if score < self.position.best_score:
             self.position.best_score = score
-            save_best(self.output, self.optimisation, step, row)
+            checkpoint.save_best(self.output, self.optimisation, step, row)
         return row

@@ -1,6 +1,5 @@
 """One optimiser step: loss, gradients, new weights."""
 
-import dataclasses
 import math
 
 import torch
@@ -23,53 +22,34 @@ from resdepth_colmap.training.synced_norm import sync_norms
 WARM_UP_SHARE = 0.05
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class Optimisation:
-    """A network in training.
+    """A network in training, on the device of this process.
 
-    Attributes:
-        network: The network, for validation and for the weights file.
-        model: The module called in a step: the network, or its distributed wrapper.
-        optimiser: The optimiser, with the moments of the gradients.
-        schedule: Learning rate of each step.
+    Args:
+        network: The network.
         config: Options of the training.
         ranks: The processes.
     """
 
-    network: ResDepthNet
-    model: nn.Module
-    optimiser: torch.optim.Optimizer
-    schedule: torch.optim.lr_scheduler.LRScheduler
-    config: TrainConfig
-    ranks: Ranks
-
-    @classmethod
-    def start(
-        cls, network: ResDepthNet, config: TrainConfig, ranks: Ranks
-    ) -> "Optimisation":
-        """A training before its first step, on the device of this process."""
-        network = network.to(ranks.device)
+    def __init__(  # noqa: D107
+        self, network: ResDepthNet, config: TrainConfig, ranks: Ranks
+    ) -> None:
+        self.config, self.ranks = config, ranks
+        self.network = network.to(ranks.device)
         _freeze(network, config)
-        model: nn.Module = network
+        self._model: nn.Module = network
         if ranks.count > 1:
             sync_norms(network)
-            model = DistributedDataParallel(network)
+            self._model = DistributedDataParallel(network)
         else:
-            network = network.to(memory_format=torch.channels_last)  # type: ignore[call-overload] # torch's stubs lack the keyword
+            network.to(memory_format=torch.channels_last)  # type: ignore[call-overload] # torch's stubs lack the keyword
         kinds = {Optimiser.ADAM: torch.optim.Adam, Optimiser.ADAMW: torch.optim.AdamW}
-        optimiser = kinds[config.optimiser](
+        self.optimiser = kinds[config.optimiser](
             [value for value in network.parameters() if value.requires_grad],
             lr=config.learning_rate,
             weight_decay=config.weight_decay,
         )
-        return cls(
-            network=network,
-            model=model,
-            optimiser=optimiser,
-            schedule=_schedule(optimiser, config),
-            config=config,
-            ranks=ranks,
-        )
+        self.schedule = _schedule(self.optimiser, config)
 
     @property
     def learning_rate(self) -> float:
@@ -90,7 +70,7 @@ class Optimisation:
             TrainingError: If loss or gradients are not finite. Only the running
                 statistics of the norms have changed then.
         """
-        self.model.train()
+        self._model.train()
         _freeze(self.network, self.config)
         batch = batch.to(self.ranks.device)
         inputs = batch.inputs.contiguous(memory_format=torch.channels_last)
@@ -117,7 +97,7 @@ class Optimisation:
         """The network's output in single precision, whatever the precision inside."""
         halved = self.config.precision is Precision.BFLOAT16
         with torch.autocast(inputs.device.type, torch.bfloat16, enabled=halved):
-            inverse_depth, log_scale = self.model(inputs, sample_source)
+            inverse_depth, log_scale = self._model(inputs, sample_source)
         return Refinement(
             inverse_depth.float(), None if log_scale is None else log_scale.float()
         )
