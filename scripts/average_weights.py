@@ -2,10 +2,9 @@
 
     python -m scripts.average_weights mean.safetensors first.safetensors ...
 
-The mean of weights along one training is often better than each of them, on scenes that
-are unlike the training's most of all (Izmailov et al., "Averaging Weights Leads to
-Wider Optima and Better Generalization", UAI 2018). The statistics of the batch norms
-are averaged with them.
+The mean of weights along a training often generalises better than each of them
+(Izmailov et al., "Averaging Weights Leads to Wider Optima and Better Generalization",
+UAI 2018). The statistics of the batch norms are averaged too.
 """
 
 import argparse
@@ -19,7 +18,7 @@ from resdepth_colmap.network.weights import load_weights, read_facts, save_weigh
 
 
 def averaged(paths: list[Path]) -> ResDepthNet:
-    """The network whose weights are the mean of theirs.
+    """The network with the mean of their weights.
 
     Raises:
         WeightsError: If a file cannot be read or is of another network than the first.

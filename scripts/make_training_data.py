@@ -1,9 +1,9 @@
-"""Render rooms and match them: data of the kind that the weights are trained on.
+"""Render and match rooms: training data like that of the shipped weights.
 
     python -m scripts.make_training_data rooms --num-scenes 300 --workers 2
 
-Two views in most rooms, three or four in some, so that the network sees maps from one
-source and from several. Goes on where it stopped.
+Most rooms have two views, some three or four: maps are matched with one source or with
+several. Finished rooms are kept.
 """
 
 import argparse
@@ -17,7 +17,7 @@ VIEW_COUNTS = (2, 2, 2, 3, 2, 2, 4)
 
 
 def make_room(output: Path, seed: int) -> str:
-    """Render one room, and match all of its views."""
+    """Render a room and match its views; returns a line for the log."""
     from resdepth_colmap.config import StereoBackend, StereoConfig, SynthesisConfig
     from resdepth_colmap.errors import WorkspaceError
     from resdepth_colmap.io.colmap.model import read_scene
@@ -27,7 +27,7 @@ def make_room(output: Path, seed: int) -> str:
 
     config = SynthesisConfig(
         num_views=VIEW_COUNTS[seed % len(VIEW_COUNTS)],
-        width_px=544,  # a crop of 512 x 384 and some play
+        width_px=544,  # a crop of 512 x 384 has room to move
         height_px=416,
         seed=seed,
     )
@@ -38,14 +38,14 @@ def make_room(output: Path, seed: int) -> str:
         report = stereo_workspace(
             workspace, scene, StereoConfig(seed=seed, filter=False), StereoBackend.CPU
         )
-    except WorkspaceError as error:  # its views have nothing in common
+    except WorkspaceError as error:  # its views do not overlap
         shutil.rmtree(path)
-        return f"{path.name} is left out: {error}"
+        return f"{path.name}: left out: {error}"
     return f"{path.name}: {len(report.matched)} matched, {len(report.kept)} kept"
 
 
 def main() -> None:
-    """Read the command line and keep the workers busy."""
+    """Read the command line and make the rooms."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("output", type=Path)
     parser.add_argument("--num-scenes", type=int, default=300)
@@ -60,7 +60,7 @@ def main() -> None:
         make = partial(make_room, arguments.output)
         for line in pool.imap_unordered(make, seeds):
             print(line, flush=True)
-        pool.close()  # or else they are killed, and pycolmap prints where it was
+        pool.close()  # a terminated worker would print a stack (pycolmap)
         pool.join()
 
 

@@ -27,7 +27,7 @@ def take_step(samples: Path, weights: Path, output: Path) -> None:
     )
     network_config = load_weights(weights).config
     with join_ranks(Device.CPU) as ranks:
-        run = Optimisation.start(fresh_network(network_config, config), config, ranks)
+        run = Optimisation(fresh_network(network_config, config), config, ranks)
         paths = tuple(sorted(samples.glob("*.npz")))
         crops = CropSet(paths=paths, network=network_config, config=config)
         (batch,) = crops.batches([0], ranks)

@@ -37,8 +37,7 @@ def demo(output: Path, **values: Any) -> None:
     from resdepth_colmap.synthetic.synthesize import synthesize
 
     progress = BarProgress()
-    with progress.stage("Rendering", 1) as advance:
-        (room,) = synthesize(output, config, lambda _done, _total: advance(1))
+    (room,) = synthesize(output, config, progress)
     result = refine_and_report(room, RunConfig(backend=StereoBackend.CPU), progress)
     images = result.refine.images
     kinds = {name: record["input"] for name, record in images.items()}

@@ -1,4 +1,4 @@
-"""The command `synthesize`: rendered rooms with exact depth."""
+"""The command `synthesize`."""
 
 from pathlib import Path
 from typing import Any
@@ -10,7 +10,7 @@ from resdepth_colmap.config import SynthesisConfig
 
 
 @command(
-    "Render rooms with known depth, to train on.",
+    "Render rooms with exact depth, for training.",
     "synthesize rooms/ --num-scenes 20 --num-views 2 --workers 2",
 )
 @click.argument("output", type=click.Path(path_type=Path, file_okay=False))
@@ -20,19 +20,17 @@ from resdepth_colmap.config import SynthesisConfig
     type=click.IntRange(min=1),
     default=1,
     show_default=True,
-    help="Rooms to render at once.",
+    help="Number of processes, each rendering a room.",
 )
 def synthesize(output: Path, workers: int, **values: Any) -> None:
-    """Render rooms into workspaces OUTPUT/room_SEED, each with ground_truth/.
+    """Render rooms as COLMAP workspaces OUTPUT/room_SEED with ground_truth/.
 
-    The same options give the same rooms. Rooms that are there are kept. The paths are
-    printed.
+    The same options give the same rooms. Existing rooms are kept. Prints the paths of
+    the workspaces.
     """
     config = build_config(SynthesisConfig, values)
     from resdepth_colmap.cli.log import BarProgress
     from resdepth_colmap.synthetic.synthesize import synthesize as render
 
-    with BarProgress().stage("Rendering", config.num_scenes) as advance:
-        paths = render(output, config, lambda _done, _total: advance(1), workers)
-    for path in paths:
+    for path in render(output, config, BarProgress(), workers):
         click.echo(path)

@@ -16,7 +16,7 @@ from resdepth_colmap.training.config import Preset, TrainConfig
 
 
 @command(
-    "Train a network on workspaces with known depth.",
+    "Train a network on workspaces with ground truth.",
     "synthesize rooms/ --num-scenes 100 --num-views 3",
     "train rooms/ --output training/ --validate-on real_scenes/",
     "train rooms/ --output more/ --init shipped --learning-rate 3e-4",
@@ -32,21 +32,21 @@ from resdepth_colmap.training.config import Preset, TrainConfig
     "--output",
     type=click.Path(path_type=Path, file_okay=False),
     required=True,
-    help="Folder of weights, state, log and pictures; a stopped training goes on.",
+    help="Folder of weights, state, log and pictures; an existing training resumes.",
 )
 @click.option(
     "--validate-on",
     multiple=True,
     type=click.Path(path_type=Path, exists=True, file_okay=False),
-    help="Workspace with ground_truth/, or folder of such, to validate with and never "
-    "to train on, such as real photographs; may be repeated. It then says which "
-    "weights are best.",
+    help="Workspace with ground_truth/, or folder of such, for validation only, for "
+    "example of real photographs; can be repeated. The best weights are then the best "
+    "on these.",
 )
 @enum_option(
     "--preset",
     kind=Preset,
     default=Preset.DEFAULT,
-    text="What holds for the options below that are not given: what is shown there, or "
+    text="Values of the options below that are not given: the defaults shown there, or "
     "the paper's training and network.",
 )
 @config_options(TrainConfig)
@@ -58,11 +58,11 @@ def train(
     preset: Preset,
     **values: Any,
 ) -> None:
-    """Train a network on WORKSPACES (or folders of such) that have a ground_truth/.
+    """Train a network on WORKSPACES (or folders of such) with ground_truth/.
 
-    Depth maps that are there are used, unfiltered and filtered; where there are none,
-    they are matched first. `torchrun -m resdepth_colmap train ...` trains in several
-    processes. The path of the weights is printed, for `refine --weights`.
+    Uses all their depth maps, unfiltered and filtered; workspaces without any are
+    matched first. `torchrun -m resdepth_colmap train ...` trains in several processes.
+    Prints the path of the weights, for `refine --weights`.
     """
     config = TrainConfig.of(preset, given_values(TrainConfig, values))
     given = given_values(NetworkConfig, values)

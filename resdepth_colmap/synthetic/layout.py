@@ -1,4 +1,4 @@
-"""How things stand in a room or on a table: crowded, stacked, some in the air."""
+"""The layout of a scene: objects on the floor or on a table, stacked or in the air."""
 
 from collections.abc import Sequence
 
@@ -30,15 +30,15 @@ def _any_turn(rng: Rng) -> Matrix:
 
 
 def fill_room(builder: SceneBuilder, low: Matrix, high: Matrix) -> Matrix:
-    """Put furniture and clutter on the floor, crowded round a focus.
+    """Put furniture and small objects on the floor, most of them near a focus.
 
     Args:
-        builder: Takes them.
+        builder: The scene to add them to.
         low: Lower corner of the room, shape (3,), metres.
         high: Upper corner.
 
     Returns:
-        The focus, shape (3,); the camera looks at it roughly along +y.
+        The focus, shape (3,), metres; the camera faces it roughly along +y.
     """
     rng = builder.rng
     depth = rng.uniform(-0.1, 0.5) * high[1]
@@ -46,36 +46,36 @@ def fill_room(builder: SceneBuilder, low: Matrix, high: Matrix) -> Matrix:
     kinds = (*FURNITURE, *FURNITURE, *THIN, objects.pile)
     for _ in range(int(rng.integers(7, 20))):
         thing = _any(rng, kinds)
-        place = _spot(rng, focus, low, high)
-        builder.add(thing.moved([*place, 0], _any_turn(rng)))
+        xy = _spot(rng, focus, low, high)
+        builder.add(thing.moved([*xy, 0], _any_turn(rng)))
         if thing.size[2] < 1.2 and rng.random() < 0.6:
-            _put_on_top(builder, place, float(thing.size[2]))
+            _put_on_top(builder, xy, float(thing.size[2]))
     for _ in range(int(rng.integers(5, 25))):
         thing = _any(rng, SMALL if rng.random() < 0.6 else THIN)
-        place = _spot(rng, focus, low, high)
-        builder.add(thing.moved([*place, 0], _any_turn(rng)))
+        xy = _spot(rng, focus, low, high)
+        builder.add(thing.moved([*xy, 0], _any_turn(rng)))
     return focus
 
 
-def _put_on_top(builder: SceneBuilder, place: Matrix, height: float) -> None:
+def _put_on_top(builder: SceneBuilder, xy: Matrix, height: float) -> None:
     rng = builder.rng
     for _ in range(int(rng.integers(1, 6))):
-        x, y = place + rng.normal(0, 0.15, 2)
+        x, y = xy + rng.normal(0, 0.15, 2)
         builder.add(objects.small_thing(rng).moved([x, y, height * 0.99]))
 
 
 def _spot(rng: Rng, focus: Matrix, low: Matrix, high: Matrix) -> Matrix:
-    """A place on the floor (2,), seldom on the camera's side of the focus."""
+    """A point on the floor, shape (2,), seldom on the camera's side of the focus."""
     x, y = focus[:2] + rng.normal(0, 0.9, 2)
     y = max(y, focus[1] - rng.uniform(0.2, 1.3))
     return np.asarray(np.clip([x, y], low[:2] + 0.25, high[:2] - 0.25))
 
 
 def lay_table(builder: SceneBuilder) -> Matrix:
-    """A slab with props, and mostly a board or a cloth behind them.
+    """Add a table with objects on it, and mostly a board or a curtain behind them.
 
     Returns:
-        The middle of the props, shape (3,), metres.
+        The focus among the objects, shape (3,), metres.
     """
     rng = builder.rng
     top, width, depth = rng.uniform([0.4, 1.2, 0.8], [0.9, 2.6, 1.6])
@@ -99,7 +99,7 @@ def lay_table(builder: SceneBuilder) -> Matrix:
 
 
 def _prop(rng: Rng) -> tuple[Mesh, Matrix]:
-    """Something of table size, and its turn: half of them roughly face the camera."""
+    """An object of table size, and its rotation: half of them face the camera."""
     pools = (SMALL, SMALL, THIN, _ROWS)
     thing = _any(rng, pools[int(rng.integers(len(pools)))])
     limit = rng.uniform(0.25, 0.8)
@@ -112,26 +112,24 @@ def _add_backdrop(builder: SceneBuilder, behind: float, top: float) -> None:
     rng = builder.rng
     kind = rng.random()
     if kind < 0.5:
-        lean = rng.normal(0, 0.15)
-        c, s = np.cos(lean), np.sin(lean)
-        turn = np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
-        turn = meshes.turn_z(rng.normal(0, 0.2)) @ turn
+        lean = meshes.turn(0, rng.normal(0, 0.15))
+        turn = meshes.turn_z(rng.normal(0, 0.2)) @ lean
         board = meshes.box(rng.uniform([0.8, 0.02, 0.5], [2.5, 0.03, 1.3]), 0.12)
         builder.add(board.moved([rng.normal(0, 0.2), behind, top], turn), large=True)
     elif kind < 0.75:
         curtain = thin_objects.curtain(rng)
-        place = [rng.normal(0, 0.3), behind, top * 0.5]
-        builder.add(curtain.moved(place), large=True)
+        shift = [rng.normal(0, 0.3), behind, top * 0.5]
+        builder.add(curtain.moved(shift), large=True)
 
 
 def hang_things(
     builder: SceneBuilder, focus: Matrix, low: Matrix, high: Matrix
 ) -> None:
-    """Put things in the air, in some scenes: depth there knows no floor.
+    """Add objects in mid-air, in some scenes: their depth does not depend on a floor.
 
     Args:
-        builder: Takes them.
-        focus: Where they are about, shape (3,), metres.
+        builder: The scene to add them to.
+        focus: Their mean position, shape (3,), metres.
         low: Lower corner of the room, shape (3,), metres.
         high: Upper corner.
     """
@@ -139,9 +137,9 @@ def hang_things(
     count = int(rng.integers(1, 9)) if rng.random() < 0.4 else 0
     for _ in range(count):
         thing = _any(rng, THIN if rng.random() < 0.5 else SMALL)
-        thing = thing.moved([0, 0, 0], meshes.random_rotation(rng)).seated()
+        thing = thing.rotated(meshes.random_rotation(rng)).seated()
         free = max(float(high[2] - thing.size[2]), 0.1)
-        place = focus + rng.normal(0, 1, 3) * [0.6, 0.4, 0.5]
-        place[1] = max(place[1], focus[1] - 0.3)
-        place[2] = np.clip(place[2], 0.05, free)
-        builder.add(thing.moved(np.clip(place, low + 0.2, high - 0.2)))
+        shift = focus + rng.normal(0, 1, 3) * [0.6, 0.4, 0.5]
+        shift[1] = max(shift[1], focus[1] - 0.3)
+        shift[2] = np.clip(shift[2], 0.05, free)
+        builder.add(thing.moved(np.clip(shift, low + 0.2, high - 0.2)))

@@ -1,7 +1,7 @@
-"""Things that stand in rooms, built of primitives; each stands on z = 0.
+"""Furniture and small objects, built of primitives; each stands on z = 0.
 
 A slot of a mesh is one material: the legs of a chair share one, its seat has another.
-Sizes are those of real things, in metres.
+Sizes are those of real objects, in metres.
 """
 
 from collections.abc import Callable
@@ -12,6 +12,7 @@ from resdepth_colmap.synthetic import meshes
 from resdepth_colmap.synthetic.meshes import Mesh, Rng, merge
 
 Builder = Callable[[Rng], Mesh]
+"""Builds one random object."""
 
 
 def carton(rng: Rng) -> Mesh:
@@ -55,36 +56,33 @@ def chair(rng: Rng) -> Mesh:
     back = seat + rng.uniform(0.3, 0.55)
     lean = rng.uniform(0, 0.12)
     if rng.random() < 0.5:
-        cushion = meshes.superquadric([width, depth, 0.07], (0.3, 0.3)).moved(
-            [0, 0, seat]
-        )
+        cushion = meshes.superquadric([width, depth, 0.07], (0.3, 0.3))
+        cushion = cushion.moved([0, 0, seat])
     else:
         cushion = meshes.box([width, depth, 0.03]).moved([0, 0, seat - 0.015])
     x, y = width / 2 - thin, depth / 2 - thin
     splay = rng.uniform(0, 0.06)
-    parts = [
-        meshes.rod(
-            [sx * (x + splay), sy * (y + splay), 0], [sx * x, sy * y, seat], thin
-        )
-        for sx in (-1, 1)
-        for sy in (-1, 1)
-    ]
-    parts += [
-        meshes.rod([s * x, y, seat], [s * x, y + lean, back], thin) for s in (-1, 1)
-    ]
+    parts = []
+    for sx, sy in ((-1, -1), (-1, 1), (1, -1), (1, 1)):
+        foot = [sx * (x + splay), sy * (y + splay), 0]
+        parts.append(meshes.rod(foot, [sx * x, sy * y, seat], thin))
+    parts += _pair(x, (y, seat), (y + lean, back), thin)
     parts += _chair_back(rng, x, (y, y + lean), (seat, back))
     if rng.random() < 0.4:
-        parts += [
-            meshes.rod([s * x, -y, 0.2], [s * x, y, 0.2], thin * 0.7) for s in (-1, 1)
-        ]
+        parts += _pair(x, (-y, 0.2), (y, 0.2), thin * 0.7)
     if rng.random() < 0.25:
-        arm = seat + 0.2
-        parts += [meshes.rod([s * x, -y, arm], [s * x, y, arm], thin) for s in (-1, 1)]
-        parts += [
-            meshes.rod([s * x, -y, seat], [s * x, -y, arm], thin) for s in (-1, 1)
-        ]
+        rest = seat + 0.2
+        parts += _pair(x, (-y, rest), (y, rest), thin)
+        parts += _pair(x, (-y, seat), (-y, rest), thin)
     frame = merge(parts).slotted(1)
     return merge([cushion, frame])
+
+
+def _pair(
+    x: float, start: tuple[float, float], end: tuple[float, float], radius: float
+) -> list[Mesh]:
+    """A bar from `start` to `end`, both (y, z), at -x and at x."""
+    return [meshes.rod([s * x, *start], [s * x, *end], radius) for s in (-1, 1)]
 
 
 def _chair_back(
@@ -99,8 +97,8 @@ def _chair_back(
             for slat, h in zip(slats, heights, strict=True)
         ]
     if kind == 1:  # upright bars
-        places = np.linspace(-x, x, int(rng.integers(4, 9)))
-        bars = [meshes.rod([p, y[0], z[0]], [p, y[1], z[1]], 0.006) for p in places]
+        across = np.linspace(-x, x, int(rng.integers(4, 9)))
+        bars = [meshes.rod([u, y[0], z[0]], [u, y[1], z[1]], 0.006) for u in across]
         return [*bars, meshes.rod([-x, y[1], z[1]], [x, y[1], z[1]], 0.014)]
     panel = meshes.box([2 * x, 0.015, 0.55 * (z[1] - z[0])])
     return [panel.moved([0, y[1], z[0] + 0.45 * (z[1] - z[0])])]
@@ -115,15 +113,8 @@ def books(rng: Rng, length: float | None = None) -> Mesh:
         thick, tall, deep = rng.uniform([0.008, 0.75, 0.12], [0.05, 1.1, 0.2])
         book = meshes.box([thick, deep, height * tall], cell=0.15)
         lean = rng.uniform(0.1, 0.4) if rng.random() < 0.08 else 0.0
-        turn = np.array(
-            [
-                [np.cos(lean), 0, np.sin(lean)],
-                [0, 1, 0],
-                [-np.sin(lean), 0, np.cos(lean)],
-            ]
-        )
         push = rng.uniform(-0.02, 0.02)
-        parts.append(book.moved([x + thick / 2, push, 0], turn))
+        parts.append(book.moved([x + thick / 2, push, 0], meshes.turn(1, lean)))
         x += thick + 0.001 + lean * height * 0.5 + (0.05 if rng.random() < 0.05 else 0)
     return merge(parts, keep_slots=False)
 
@@ -134,9 +125,8 @@ def book_pile(rng: Rng) -> Mesh:
     for _ in range(int(rng.integers(2, 9))):
         size = rng.uniform([0.12, 0.16, 0.008], [0.22, 0.3, 0.05])
         turn = meshes.turn_z(rng.normal(0, 0.25))
-        parts.append(
-            meshes.box(size, cell=0.15).moved([*rng.normal(0, 0.01, 2), z], turn)
-        )
+        book = meshes.box(size, cell=0.15)
+        parts.append(book.moved([*rng.normal(0, 0.01, 2), z], turn))
         z += size[2]
     return merge(parts, keep_slots=False)
 
@@ -146,13 +136,9 @@ def shelf(rng: Rng) -> Mesh:
     width, depth = rng.uniform([0.5, 0.22], [1.4, 0.35])
     levels, gap = int(rng.integers(2, 6)), rng.uniform(0.28, 0.42)
     height = levels * gap
-    boards = [
-        meshes.box([width, depth, 0.02]).moved([0, 0, z * gap])
-        for z in range(levels + 1)
-    ]
-    sides = [
-        meshes.box([0.02, depth, height]).moved([s * width / 2, 0, 0]) for s in (-1, 1)
-    ]
+    board, side = meshes.box([width, depth, 0.02]), meshes.box([0.02, depth, height])
+    boards = [board.moved([0, 0, z * gap]) for z in range(levels + 1)]
+    sides = [side.moved([s * width / 2, 0, 0]) for s in (-1, 1)]
     if rng.random() < 0.6:
         sides.append(meshes.box([width, 0.01, height]).moved([0, depth / 2, 0]))
     parts = [merge(boards + sides)]
@@ -181,7 +167,7 @@ def cylinder(rng: Rng) -> Mesh:
 
 def _perhaps_tipped(rng: Rng, mesh: Mesh, chance: float) -> Mesh:
     if rng.random() < chance:
-        return mesh.moved([0, 0, 0], meshes.random_rotation(rng)).seated()
+        return mesh.rotated(meshes.random_rotation(rng)).seated()
     return mesh
 
 
@@ -226,19 +212,17 @@ def ring(rng: Rng) -> Mesh:
     radius = rng.uniform(0.05, 0.3)
     parts = [meshes.torus(radius, radius * rng.uniform(0.03, 0.45))]
     if rng.random() < 0.4:
-        for angle in np.linspace(
-            0, 2 * np.pi, int(rng.integers(5, 20)), endpoint=False
-        ):
+        count = int(rng.integers(5, 20))
+        for angle in np.linspace(0, 2 * np.pi, count, endpoint=False):
             end = radius * np.array([np.cos(angle), np.sin(angle), 0])
             parts.append(meshes.rod([0, 0, 0], end, 0.004).slotted(1))
-    return merge(parts).moved([0, 0, 0], meshes.random_rotation(rng)).seated()
+    return merge(parts).rotated(meshes.random_rotation(rng)).seated()
 
 
 def blob(rng: Rng) -> Mesh:
     """A stone, a bust, a crumpled thing: a ball pushed in and out by noise."""
-    base = meshes.superquadric(
-        rng.uniform(0.1, 0.45) * rng.uniform(0.6, 1, 3), cells=44
-    )
+    size = rng.uniform(0.1, 0.45) * rng.uniform(0.6, 1, 3)
+    base = meshes.superquadric(size, cells=44)
     scale = float(base.size.max())
     push = meshes.waves(rng, base.vertices, scale * rng.uniform(0.3, 1.2), 4)
     if rng.random() < 0.3:
@@ -249,31 +233,22 @@ def blob(rng: Rng) -> Mesh:
 
 
 def small_thing(rng: Rng) -> Mesh:
-    """Any one of the small things."""
+    """One of the small objects."""
     return SMALL[rng.integers(len(SMALL))](rng)
 
 
 def pile(rng: Rng) -> Mesh:
-    """Several things on top of each other."""
+    """Several objects on top of each other."""
     z, parts = 0.0, []
     for _ in range(int(rng.integers(2, 5))):
         kind = carton if rng.random() < 0.6 else small_thing
         turn = meshes.turn_z(rng.uniform(0, 2 * np.pi))
-        thing = kind(rng).moved([0, 0, 0], turn)
+        thing = kind(rng).rotated(turn)
         parts.append(thing.moved([*rng.normal(0, 0.03, 2), z]))
         z += thing.size[2]
     return merge(parts, keep_slots=False)
 
 
 SMALL: tuple[Builder, ...] = (
-    carton,
-    carton,
-    cylinder,
-    vase,
-    vase,
-    cup,
-    ball,
-    ring,
-    blob,
-    book_pile,
+    *(carton, carton, cylinder, vase, vase, cup, ball, ring, blob, book_pile),
 )

@@ -1,6 +1,6 @@
-"""Pictures and exact depth of a room by ray casting (open3d's Embree, on the CPU)."""
+"""Images and exact depth of a room by ray casting (open3d's Embree, on the CPU)."""
 
-import dataclasses
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -22,9 +22,15 @@ _OCCLUSION_REACH = 1.2  # metres; farther things do not darken a corner
 _LIFT = 1e-3  # metres; a ray that starts on a surface must not hit it at once
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
-class _Hits:
-    """What rays met: faces (N,), weights of their corners (N, 3), distance (N,)."""
+class _Hits(NamedTuple):
+    """Where N rays hit.
+
+    Attributes:
+        faces: Index of the face, shape (N,).
+        corners: Weights of its corners, shape (N, 3).
+        distance: In lengths of the ray, shape (N,); 1 = no hit.
+        hit: Whether there is a hit, shape (N,).
+    """
 
     faces: Indices
     corners: Floats
@@ -32,17 +38,16 @@ class _Hits:
     hit: npt.NDArray[np.bool_]
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
-class _Surface:
-    """What shading needs where N rays hit.
+class _Surface(NamedTuple):
+    """The surfaces that N rays hit.
 
     Attributes:
         kind: Index of the material, shape (N,).
         albedo: Reflected share of the light, shape (N, 3).
         start: The point, lifted off the surface, shape (N, 3).
         normal: Unit normal towards the eye, shape (N, 3).
-        mirrored: The ray as the surface would mirror it, shape (N, 3).
-        cosine: Of the angle between normal and ray, shape (N,).
+        mirrored: Direction of the mirrored ray, shape (N, 3).
+        cosine: Cosine of the angle between normal and ray, shape (N,).
         open_sky: Share of the ambient light that arrives, shape (N,).
     """
 
@@ -56,10 +61,10 @@ class _Surface:
 
 
 class Tracer:
-    """A room made ready for rays: geometry, textures with mip maps, baked occlusion.
+    """Renders a room: geometry, textures with mip maps, baked occlusion.
 
     Args:
-        room: What to look at.
+        room: The room.
         num_threads: Threads of the ray caster.
     """
 
@@ -75,21 +80,20 @@ class Tracer:
         flat = np.cross(sides[:, 1] - sides[:, 0], sides[:, 2] - sides[:, 0])
         length = np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-20)
         self._face_normals = (flat / length).astype(np.float32)
-        occlusion = self._bake_occlusion()
-        columns = (mesh.normals, mesh.uv, occlusion)
+        columns = (mesh.normals, mesh.uv, self._bake_occlusion())
         self._attributes = np.column_stack(columns).astype(np.float32)
         self._atlas = Atlas(room.textures)
         kinds = room.materials
         self._texture = np.array([kind.texture for kind in kinds])
-        self._tint = np.array([kind.tint for kind in kinds], dtype=np.float32)
-        self._span = np.array([kind.span for kind in kinds], dtype=np.float32)
-        self._offset = np.array([kind.offset for kind in kinds], dtype=np.float32)
-        self._gloss = np.array([kind.gloss for kind in kinds], dtype=np.float32)
-        self._shininess = np.array([kind.shininess for kind in kinds], dtype=np.float32)
-        self._emission = np.array([kind.emission for kind in kinds], dtype=np.float32)
+        self._tint = np.array([kind.tint for kind in kinds], np.float32)
+        self._span = np.array([kind.span for kind in kinds], np.float32)
+        self._offset = np.array([kind.offset for kind in kinds], np.float32)
+        self._gloss = np.array([kind.gloss for kind in kinds], np.float32)
+        self._shininess = np.array([kind.shininess for kind in kinds], np.float32)
+        self._emission = np.array([kind.emission for kind in kinds], np.float32)
 
     def depth(self, view: View) -> DepthMap:
-        """Exact depth at the pixel centres, along the optical axis; 0 = nothing hit."""
+        """Exact depth at the pixel centres, along the optical axis; 0 = no hit."""
         origin, directions = _pixel_rays(view, 1)
         hits = self._cast(origin, directions)
         shape = (view.camera.height_px, view.camera.width_px)
@@ -97,7 +101,7 @@ class Tracer:
         return np.asarray(depth, dtype=np.float32)
 
     def radiance(self, view: View) -> Floats:
-        """Light that reaches each pixel, linear, shape (H, W, 3); unbounded above."""
+        """Linear light at each pixel, shape (H, W, 3); unbounded above."""
         origin, directions = _pixel_rays(view, _SUPERSAMPLING)
         footprint = 1.0 / (view.camera.fx * _SUPERSAMPLING)
         width = view.camera.width_px * _SUPERSAMPLING
@@ -108,10 +112,9 @@ class Tracer:
 
     @staticmethod
     def _light_samples(count: int, width: int) -> Indices:
-        """Which of a lamp's four points a ray asks: all four within each pixel."""
+        """Index of the lamp point of each ray, so that a pixel has all four."""
         index = np.arange(count)
-        samples: Indices = (index // width) % 2 * 2 + index % width % 2
-        return samples
+        return np.asarray((index // width) % 2 * 2 + index % width % 2)
 
     def _cast(self, origin: Floats, directions: Floats) -> _Hits:
         rays = np.empty((len(directions), 6), dtype=np.float32)
@@ -138,7 +141,7 @@ class Tracer:
     def _bake_occlusion(self) -> Floats:
         """Open share of the hemisphere at each vertex, shape (V,), 0..1.
 
-        All vertices use one set of directions: no noise that could be matched.
+        All vertices use the same directions: no noise that could be matched.
         """
         mesh = self.room.mesh
         vertices, normals = mesh.vertices.astype(np.float32), mesh.normals
@@ -165,9 +168,9 @@ class Tracer:
         footprint: float,
         block: Indices | None,
     ) -> Floats:
-        """Light along rays (N, 3); `block` picks lamp points, see _light_samples.
+        """Light along rays (N, 3), with the lamp points `block` of `_light_samples`.
 
-        None makes the cheap light of a mirror image: no shadows, no highlights.
+        None renders a mirror image: no shadows, no highlights.
         """
         hits = self._cast(origin, directions)
         surface = self._surface(hits, origin, directions, footprint)
@@ -175,8 +178,8 @@ class Tracer:
         diffuse = surface.open_sky[:, None] * self.room.ambient.astype(np.float32)
         diffuse += self._emission[kind][:, None]
         shine = np.zeros_like(diffuse)
-        for number, light in enumerate(self.room.lights):
-            arrives, toward = self._illuminate(light, number, surface, block)
+        for index, light in enumerate(self.room.lights):
+            arrives, toward = self._illuminate(light, index, surface, block)
             diffuse += arrives
             if block is not None:
                 lobe = np.maximum(_dot(surface.mirrored, toward), 1e-6)
@@ -199,8 +202,8 @@ class Tracer:
         grazing = np.maximum(-_dot(flat, view), 0.12)
         span = self._span[kind]
         width = footprint * hits.distance / grazing**0.6 / span
-        place = (values[:, 3:5] + self._offset[kind]) / span[:, None]
-        texel = self._atlas.sample(self._texture[kind], place, width.astype(np.float32))
+        uv = (values[:, 3:5] + self._offset[kind]) / span[:, None]
+        texel = self._atlas.sample(self._texture[kind], uv, width.astype(np.float32))
         cosine = _dot(normal, view)
         point = origin + hits.distance[:, None] * directions
         return _Surface(
@@ -210,7 +213,7 @@ class Tracer:
             normal=normal,
             mirrored=(view - 2 * cosine[:, None] * normal).astype(np.float32),
             cosine=-cosine,
-            # corners are darker, and what looks down is
+            # darker in corners and where the normal points down
             open_sky=(0.25 + 0.75 * values[:, 5]) * (0.75 + 0.25 * normal[:, 2]),
         )
 
@@ -220,19 +223,18 @@ class Tracer:
         """Flat and smooth normals, turned towards the eye."""
         flat = self._face_normals[hits.faces]
         flat = np.where(_dot(flat, view)[:, None] > 0, -flat, flat)
-        smooth = smooth / np.maximum(
-            np.linalg.norm(smooth, axis=1, keepdims=True), 1e-6
-        )
+        length = np.linalg.norm(smooth, axis=1, keepdims=True)
+        smooth = smooth / np.maximum(length, 1e-6)
         turned = np.where(_dot(flat, smooth)[:, None] < 0, -smooth, smooth)
         return flat, turned.astype(np.float32)
 
     def _illuminate(
-        self, light: Light, number: int, surface: _Surface, block: Indices | None
+        self, light: Light, index: int, surface: _Surface, block: Indices | None
     ) -> tuple[Floats, Floats]:
         """Light of one lamp on surfaces (N, 3), and the unit direction to it (N, 3)."""
         lamp = np.asarray(light.position, dtype=np.float32)
         if block is not None:
-            lamp = _lamp_points(light, number)[block]
+            lamp = _lamp_points(light, index)[block]
         toward = np.asarray(lamp - surface.start, dtype=np.float32)
         distance2 = _dot(toward, toward)
         unit = np.asarray(toward / np.sqrt(distance2)[:, None], dtype=np.float32)
@@ -253,9 +255,9 @@ class Tracer:
         color[rows] += share[rows, None] * (seen - 0.5 * color[rows])
 
 
-def _lamp_points(light: Light, number: int) -> Floats:
-    """Four points on a lamp, shape (4, 3): its shadows are soft."""
-    angle = np.arange(4) * (np.pi / 2) + number
+def _lamp_points(light: Light, index: int) -> Floats:
+    """Four points on a lamp, shape (4, 3), for soft shadows."""
+    angle = np.arange(4) * (np.pi / 2) + index
     ring = np.stack([np.cos(angle), np.sin(angle), np.sin(2 * angle) / 3], axis=1)
     return np.asarray(light.position + 0.7 * light.radius * ring, dtype=np.float32)
 
@@ -265,16 +267,14 @@ def _dot(first: Floats, second: Floats) -> Floats:
 
 
 def _pixel_rays(view: View, fineness: int) -> tuple[Floats, Floats]:
-    """Rays through the centres of (sub-)pixels; their z in the camera is 1.
+    """Rays through the centres of (sub-)pixels; their z in the camera frame is 1.
 
-    K counts a pixel's centre as index + 0.5 (COLMAP), so it is used as it is.
+    The centre of a pixel is at index + 0.5, as in COLMAP's K.
     """
     camera = view.camera
     x = (np.arange(camera.width_px * fineness) + 0.5) / fineness
     y = (np.arange(camera.height_px * fineness) + 0.5) / fineness
-    grid_x, grid_y = np.meshgrid(
-        (x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy
-    )
-    in_camera = np.stack([grid_x, grid_y, np.ones_like(grid_x)], axis=2).reshape(-1, 3)
+    u, v = np.meshgrid((x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy)
+    in_camera = np.stack([u, v, np.ones_like(u)], axis=2).reshape(-1, 3)
     directions = in_camera @ view.cam_from_world[:, :3]
     return view.center_in_world.astype(np.float32), directions.astype(np.float32)

@@ -1,4 +1,4 @@
-"""A room or a table top full of things, its surfaces and its lights."""
+"""A room: its mesh, its materials and its lights."""
 
 import dataclasses
 import enum
@@ -15,7 +15,7 @@ from resdepth_colmap.synthetic.walls import add_shell, dress_walls
 
 
 class Style(enum.StrEnum):
-    """What is photographed."""
+    """What the cameras look at."""
 
     ROOM = "room"
     TABLE = "table"
@@ -32,18 +32,18 @@ class Light:
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class Room:
-    """Everything that can be seen.
+    """Everything that the cameras can see.
 
     Attributes:
-        mesh: All triangles; a face's slot is the index of its material.
+        mesh: All triangles; the slot of a face is the index of its material.
         materials: The materials.
         textures: Pictures in 0..1 (sRGB), each (S, S, 3) with S a power of two.
         lights: The lamps.
-        ambient: Light from everywhere, shape (3,).
-        focus: Where the things are, shape (3,), metres.
+        ambient: Ambient light, shape (3,).
+        focus: The point that the cameras face, shape (3,), metres.
         low: Lower corner of the free space, shape (3,), metres.
         high: Upper corner of the free space, shape (3,), metres.
-        style: What kind of place it is.
+        style: What the cameras look at.
     """
 
     mesh: Mesh
@@ -57,13 +57,13 @@ class Room:
     style: Style
 
 
-def furnish(rng: Rng, style: Style, width_px: int) -> Room:
-    """A random place of that style.
+def build_room(rng: Rng, style: Style, width_px: int) -> Room:
+    """Build a random room.
 
     Args:
-        rng: Everything random comes from it.
-        style: A room, or a table top with a board behind it.
-        width_px: Width of the pictures to be made: textures are as fine as they need.
+        rng: Source of randomness.
+        style: Objects in the room, or on a table.
+        width_px: Width of the images; textures are as fine as it requires.
     """
     texels = 2 ** round(np.clip(np.log2(0.8 * width_px), 6, 10))
     builder = SceneBuilder(rng, texels)
@@ -71,10 +71,8 @@ def furnish(rng: Rng, style: Style, width_px: int) -> Room:
     low, high = size * [-0.5, -0.5, 0], size * [0.5, 0.5, 1]
     add_shell(builder, low, high)
     dress_walls(builder, high)
-    if style is Style.TABLE:
-        focus = lay_table(builder)
-    else:
-        focus = fill_room(builder, low, high)
+    on_table = style is Style.TABLE
+    focus = lay_table(builder) if on_table else fill_room(builder, low, high)
     hang_things(builder, focus, low, high)
     return Room(
         mesh=meshes.merge(builder.parts),
@@ -90,7 +88,7 @@ def furnish(rng: Rng, style: Style, width_px: int) -> Room:
 
 
 def _warmth(rng: Rng) -> Matrix:
-    """The colour of a lamp or of daylight, about white."""
+    """A warmer or colder white, shape (3,)."""
     warm = rng.normal(0, 0.12)
     return np.array([1 + warm, 1.0, 1 - warm])
 
@@ -102,7 +100,6 @@ def _lights(rng: Rng, low: Matrix, high: Matrix) -> list[Light]:
         position[2] = rng.uniform(0.55, 0.95) * high[2]
         power = rng.uniform(1.5, 5.0) if index == 0 else rng.uniform(0.2, 2.5)
         radius = float(np.exp(rng.uniform(np.log(0.03), np.log(0.5))))
-        lights.append(
-            Light(position=position, radius=radius, color=power * _warmth(rng))
-        )
+        color = power * _warmth(rng)
+        lights.append(Light(position=position, radius=radius, color=color))
     return lights

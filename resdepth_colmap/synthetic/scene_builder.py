@@ -1,4 +1,4 @@
-"""Surfaces, and the collection of meshes that wear them."""
+"""The scene builder: collects meshes and gives them materials."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -12,16 +12,16 @@ from resdepth_colmap.synthetic.patterns import random_texture
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class Material:
-    """How one surface looks.
+    """Appearance of a surface.
 
     Attributes:
         texture: Index of its texture.
-        tint: Multiplies the texture, shape (3,).
+        tint: Factor of the texture, shape (3,).
         span: Side of one repeat of the texture, in metres.
-        offset: Where the texture begins, shape (2,), in metres.
+        offset: Origin of the texture, shape (2,), in metres.
         gloss: Strength of highlights and reflections, 0..1.
         shininess: Phong exponent of the highlight.
-        emission: Light of its own, in units of white.
+        emission: Emitted light, in units of white.
     """
 
     texture: int
@@ -34,15 +34,15 @@ class Material:
 
 
 class SceneBuilder:
-    """Collects meshes and gives their slots materials.
+    """Collects meshes and gives a material to each of their slots.
 
-    How much of a scene has no texture differs from scene to scene: about a third of
-    the small surfaces and half of the large ones on average.
+    The share of surfaces without texture varies between scenes: about a third of the
+    small surfaces and half of the large ones on average.
 
     Args:
-        rng: Everything random comes from it.
-        texels: Side of the textures of things, a power of two; those of walls have
-            twice that.
+        rng: Source of randomness.
+        texels: Side of the textures of objects, a power of two; those of walls are
+            twice as large.
     """
 
     def __init__(self, rng: Rng, texels: int) -> None:  # noqa: D107
@@ -58,11 +58,11 @@ class SceneBuilder:
         self._num_small = count
 
     def surface(self, large: bool = False, emission: float = 0.0) -> int:
-        """A new material; its index.
+        """Make a material; returns its index.
 
         Args:
             large: For floors and walls: coarser textures, less gloss.
-            emission: Light of its own, in units of white.
+            emission: Emitted light, in units of white.
         """
         rng = self.rng
         first = self._num_small if large else 0
@@ -81,10 +81,10 @@ class SceneBuilder:
         return len(self.materials) - 1
 
     def add(self, mesh: Mesh, large: bool = False) -> None:
-        """Put a mesh in, each of its slots with a material of its own."""
+        """Add a mesh, each of its slots with a new material."""
         self.add_with(mesh, [self.surface(large) for _ in range(mesh.num_slots)])
 
     def add_with(self, mesh: Mesh, surfaces: Sequence[int]) -> None:
-        """Put a mesh in, its slots with these materials."""
+        """Add a mesh, its slots with these materials."""
         slots = np.asarray(surfaces)[mesh.slots]
         self.parts.append(dataclasses.replace(mesh, slots=slots))

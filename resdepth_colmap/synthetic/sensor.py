@@ -1,4 +1,4 @@
-"""What a real camera does to light: exposure, blur, noise, JPEG."""
+"""The model of a camera: exposure, blur, noise, JPEG."""
 
 import dataclasses
 import io
@@ -15,13 +15,13 @@ from resdepth_colmap.synthetic.textures import Rng
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Sensor:
-    """One camera on one day.
+    """A camera and its settings.
 
     Attributes:
-        brightness: Where the median of the first view ends, 0..1 in linear light.
-        highlight: Where at most its brightest 5 % begin; 1 is nearly white.
-        exposure_spread: Deviation of the log exposure from view to view.
-        gamma_spread: Deviation of the log gamma from view to view.
+        brightness: Median of the first exposed view, 0..1 in linear light.
+        highlight: Upper limit of its 95 % quantile; 1 is nearly white.
+        exposure_spread: Deviation of the log exposure between views.
+        gamma_spread: Deviation of the log gamma between views.
         vignetting: Share of light lost in the corners.
         blur_px: Deviation of the lens blur.
         noise: Deviation of the noise at mid grey, of full scale.
@@ -39,7 +39,7 @@ class Sensor:
 
     @classmethod
     def draw(cls, rng: Rng) -> Self:
-        """A random one: mostly good; strong differences of exposure in 15 %."""
+        """Draw a camera, mostly a good one; exposure varies strongly in 15 %."""
         strong = rng.random() < 0.15
         return cls(
             brightness=float(rng.uniform(0.10, 0.3)),
@@ -53,31 +53,29 @@ class Sensor:
         )
 
     def gain_for(self, radiance: Floats) -> float:
-        """Exposure that brings the median of a picture to `brightness`.
+        """Exposure that brings the median of an image to `brightness`.
 
-        Less, if too much of it would be blown out.
+        Less if its 95 % quantile would exceed `highlight`.
         """
         median, bright = np.percentile(radiance, [50, 95])
         middle = self.brightness / max(float(median), 1e-6)
         return min(middle, self.highlight / max(float(bright), 1e-6))
 
     def expose(self, rng: Rng, radiance: Floats, gain: float) -> ColorImage:
-        """A developed photograph.
+        """The photograph of a radiance image.
 
         Args:
-            rng: Noise and the view's own exposure come from it.
+            rng: Source of randomness, for noise and exposure of this view.
             radiance: Linear light, shape (H, W, 3).
-            gain: Exposure of the scene, see gain_for.
+            gain: Exposure of the scene, see `gain_for`.
         """
-        light = radiance * np.float32(
-            gain * np.exp(rng.normal(0, self.exposure_spread))
-        )
+        exposure = gain * np.exp(rng.normal(0, self.exposure_spread))
+        light = radiance * np.float32(exposure)
         light = light * (1 + rng.normal(0, 0.01, 3)).astype(np.float32)
         light = light * self._falloff(light.shape)
         light = np.asarray(cv2.GaussianBlur(light, (0, 0), self.blur_px), np.float32)
-        curve = np.where(
-            light < 0.5, light, 1 - 0.5 * np.exp(1 - 2 * light)
-        )  # soft shoulder
+        shoulder = 1 - 0.5 * np.exp(1 - 2 * light)
+        curve = np.where(light < 0.5, light, shoulder)
         grain = rng.standard_normal(curve.shape, dtype=np.float32)
         curve = curve + self.noise * np.sqrt(0.05 + 0.5 * np.maximum(curve, 0)) * grain
         gamma = np.exp(rng.normal(0, self.gamma_spread)) / 2.2

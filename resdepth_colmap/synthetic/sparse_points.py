@@ -1,4 +1,4 @@
-"""Sparse points of a rendered scene, as structure from motion would find them."""
+"""Sparse points of a rendered scene, as structure from motion finds them."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from resdepth_colmap.geometry.projection import transform
 from resdepth_colmap.scene import ColorImage, DepthMap, Matrix, View
 from resdepth_colmap.synthetic.textures import Rng
 
@@ -17,13 +18,13 @@ _NOISE_PX = 0.3
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class SparsePoints:
-    """Points and who sees them where.
+    """Points and their observations.
 
     Attributes:
         xyz: World coordinates, shape (N, 3), metres.
         rgb: Colours, shape (N, 3), uint8.
         visible: Whether a view sees a point, shape (V, N).
-        xy: Where, shape (V, N, 2), pixels with centres at index + 0.5.
+        xy: Its keypoint there, shape (V, N, 2), pixels with centres at index + 0.5.
     """
 
     xyz: Matrix
@@ -38,27 +39,23 @@ def sample_points(
     images: Sequence[ColorImage],
     depths: Sequence[DepthMap],
 ) -> SparsePoints:
-    """Points at corners of the pictures that two views at least see.
+    """Points at corners of the images that at least two views see.
 
     Args:
-        rng: Everything random comes from it.
+        rng: Source of randomness.
         views: The cameras.
-        images: Their pictures, each (H, W, 3).
+        images: Their images, each (H, W, 3).
         depths: Their exact depth maps, each (H, W); 0 = none.
     """
     wanted = int(rng.integers(300, 801))
-    shares = np.full(len(views), 2 * wanted // len(views) + 1)
+    count = 2 * wanted // len(views) + 1
     found = [
-        _corners(rng, view, image, depth, int(share))
-        for view, image, depth, share in zip(views, images, depths, shares, strict=True)
+        _corners(rng, view, image, depth, count)
+        for view, image, depth in zip(views, images, depths, strict=True)
     ]
-    xyz = np.concatenate([points for points, _ in found])
-    rgb = np.concatenate([colors for _, colors in found])
-    seen = [
-        _observe(view, depth, xyz) for view, depth in zip(views, depths, strict=True)
-    ]
-    visible = np.stack([sees for sees, _ in seen])
-    xy = np.stack([place for _, place in seen])
+    xyz, rgb = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    seen = [_observe(v, depth, xyz) for v, depth in zip(views, depths, strict=True)]
+    visible, xy = (np.stack(parts) for parts in zip(*seen, strict=True))
     kept = np.flatnonzero(visible.sum(axis=0) >= 2)
     kept = rng.permutation(kept)[:wanted]
     noise = rng.normal(0, _NOISE_PX, (len(views), len(kept), 2))
@@ -70,7 +67,7 @@ def sample_points(
 def _corners(
     rng: Rng, view: View, image: ColorImage, depth: DepthMap, count: int
 ) -> tuple[Matrix, npt.NDArray[np.uint8]]:
-    """Points of one view, picked the more readily the more of a corner they are."""
+    """Points of one view, drawn by their strength as corners, with their colours."""
     gray = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY)
     strength = cv2.cornerMinEigenVal(gray, 5).ravel().astype(np.float64)
     strength = np.sqrt(np.maximum(strength, 0)) + 1e-6
@@ -92,22 +89,17 @@ def _corners(
 def _observe(
     view: View, depth: DepthMap, xyz: Matrix
 ) -> tuple[npt.NDArray[np.bool_], Matrix]:
-    """Whether a view sees the points, and where it would."""
+    """Whether a view sees the points, and their projections."""
     camera = view.camera
-    in_camera = xyz @ view.cam_from_world[:, :3].T + view.cam_from_world[:, 3]
+    in_camera = transform(view.cam_from_world, xyz)
     z = in_camera[:, 2]
     ahead = np.where(z > 1e-6, z, 1.0)
     x = camera.fx * in_camera[:, 0] / ahead + camera.cx
     y = camera.fy * in_camera[:, 1] / ahead + camera.cy
-    inside = (
-        (z > 1e-6)
-        & (x >= 0)
-        & (x < camera.width_px)
-        & (y >= 0)
-        & (y < camera.height_px)
-    )
+    inside = (x >= 0) & (x < camera.width_px) & (y >= 0) & (y < camera.height_px)
     column = np.clip(np.floor(x), 0, camera.width_px - 1).astype(np.int64)
     row = np.clip(np.floor(y), 0, camera.height_px - 1).astype(np.int64)
     surface = depth[row, column]
-    visible = inside & (np.abs(surface - z) < _SAME_SURFACE * ahead)
+    near_surface = np.abs(surface - z) < _SAME_SURFACE * ahead
+    visible = (z > 1e-6) & inside & near_surface
     return visible, np.stack([x, y], axis=1)

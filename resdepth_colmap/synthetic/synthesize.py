@@ -1,39 +1,39 @@
-"""Rendered rooms as COLMAP workspaces with exact depth: to train on, to show with."""
+"""Rendered rooms as COLMAP workspaces with exact depth, for training and the demo."""
 
 import dataclasses
 import multiprocessing
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pycolmap
 
 from resdepth_colmap.config import SynthesisConfig
-from resdepth_colmap.errors import WorkspaceError
+from resdepth_colmap.io.colmap import cfg
 from resdepth_colmap.io.colmap.maps import write_depth_map
+from resdepth_colmap.io.colmap.output import make_folder
 from resdepth_colmap.io.images import write_png
+from resdepth_colmap.progress import Progress, SilentProgress
 from resdepth_colmap.scene import ColorImage, DepthMap, View
 from resdepth_colmap.synthetic.render import Tracer
-from resdepth_colmap.synthetic.room import Style, furnish
+from resdepth_colmap.synthetic.room import Style, build_room
 from resdepth_colmap.synthetic.sensor import Sensor
 from resdepth_colmap.synthetic.sparse_points import SparsePoints, sample_points
 from resdepth_colmap.synthetic.viewpoints import choose_views
 
-Progress = Callable[[int, int], None]
-"""Told after each scene: how many are done, of how many."""
-
 _TABLE_SHARE = 0.5
-_STREAM = 20200614  # parts our random numbers from those of other users of the seed
+_STREAM = 20200614  # a random stream apart from other uses of the seed
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class RenderedScene:
-    """One rendered room.
+    """A rendered room.
 
     Attributes:
-        views: Cameras and poses, V of them.
-        images: One picture a view, shape (H, W, 3), uint8.
+        views: Cameras and poses.
+        images: The image of each view, shape (H, W, 3), uint8.
         depths: Exact depth at the pixel centres, shape (H, W), float32; 0 = no hit.
         points: Sparse points with their tracks.
     """
@@ -47,16 +47,16 @@ class RenderedScene:
 def render_room(
     config: SynthesisConfig, seed: int, style: Style | None = None
 ) -> RenderedScene:
-    """Render one room. The same arguments give the same bytes.
+    """Render a room. The same arguments give the same bytes.
 
     Args:
         config: Number and size of the views (its seed is not used).
-        seed: Which room.
-        style: What kind of place; None = drawn by the seed.
+        seed: Seed of the room.
+        style: What the cameras look at; None = drawn by the seed.
     """
     rng = np.random.default_rng([_STREAM, seed])
     drawn = Style.TABLE if rng.random() < _TABLE_SHARE else Style.ROOM
-    room = furnish(rng, drawn if style is None else style, config.width_px)
+    room = build_room(rng, drawn if style is None else style, config.width_px)
     tracer = Tracer(room)
     views = choose_views(rng, room, config, tracer.depth)
     sensor = Sensor.draw(rng)
@@ -84,27 +84,18 @@ def write_scene(path: Path, scene: RenderedScene) -> None:
     Raises:
         WorkspaceError: If a file cannot be written.
     """
-    _make_folders(path)
+    for folder in ("depth_maps", "normal_maps", "consistency_graphs"):
+        make_folder(path / "stereo" / folder)
+    make_folder(path / "sparse")
     for view, image, depth in zip(scene.views, scene.images, scene.depths, strict=True):
         write_png(path / "images" / view.name, image)
         write_depth_map(path / "ground_truth" / f"{view.name}.bin", depth)
     names = [view.name for view in scene.views]
-    choices = "".join(f"{name}\n__auto__, 20\n" for name in names)
-    (path / "stereo" / "patch-match.cfg").write_text(choices, encoding="utf-8")
-    listing = "".join(f"{name}\n" for name in names)
-    (path / "stereo" / "fusion.cfg").write_text(listing, encoding="utf-8")
+    automatic = cfg.SourceSpec(kind=cfg.SourceKind.AUTO, num_auto=20)
+    sources = dict.fromkeys(names, automatic)
+    cfg.write_patch_match_cfg(path / "stereo" / "patch-match.cfg", sources)
+    cfg.write_fusion_cfg(path / "stereo" / "fusion.cfg", names)
     _reconstruction(scene).write(path / "sparse")
-
-
-def _make_folders(path: Path) -> None:
-    stereo = ("stereo/depth_maps", "stereo/normal_maps", "stereo/consistency_graphs")
-    try:
-        for folder in ("images", "sparse", "ground_truth", *stereo):
-            (path / folder).mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise WorkspaceError(
-            f"{path}: cannot make this folder ({error.strerror}); choose another one."
-        ) from error
 
 
 def _reconstruction(scene: RenderedScene) -> pycolmap.Reconstruction:
@@ -121,13 +112,13 @@ def _reconstruction(scene: RenderedScene) -> pycolmap.Reconstruction:
         )
     )
     tracks = [pycolmap.Track() for _ in points.xyz]
-    for number, view in enumerate(scene.views):
-        seen = np.flatnonzero(points.visible[number])
-        for place, point in enumerate(seen):
-            tracks[point].add_element(view.image_id, place)
+    for visible, xy, view in zip(points.visible, points.xy, scene.views, strict=True):
+        seen = np.flatnonzero(visible)
+        for index, point in enumerate(seen):
+            tracks[point].add_element(view.image_id, index)
         image = pycolmap.Image(
             name=view.name,
-            keypoints=points.xy[number, seen],
+            keypoints=xy[seen],
             camera_id=1,
             image_id=view.image_id,
         )
@@ -141,16 +132,16 @@ def _reconstruction(scene: RenderedScene) -> pycolmap.Reconstruction:
 def synthesize(
     output: Path,
     config: SynthesisConfig,
-    on_progress: Progress | None = None,
+    progress: Progress | None = None,
     num_workers: int = 1,
 ) -> list[Path]:
     """Render rooms into workspaces `output`/room_<seed>; finished ones are kept.
 
     Args:
         output: Folder of the workspaces.
-        config: How many, from which seed, how large.
-        on_progress: Told after each scene.
-        num_workers: Processes that render at once.
+        config: Number of rooms, first seed, number and size of the views.
+        progress: Advances with each room.
+        num_workers: Number of processes.
 
     Returns:
         The workspaces, in the order of their seeds.
@@ -159,32 +150,30 @@ def synthesize(
         WorkspaceError: If a file cannot be written.
     """
     seeds = range(config.seed, config.seed + config.num_scenes)
-    jobs = [(output, config, seed) for seed in seeds]
+    render = partial(_render_into, output, config)
     paths = []
-    for path in _run(jobs, num_workers):
-        paths.append(path)
-        if on_progress is not None:
-            on_progress(len(paths), len(jobs))
+    with (progress or SilentProgress()).stage("Rendering", len(seeds)) as advance:
+        for path in _run(render, seeds, num_workers):
+            paths.append(path)
+            advance(1.0)
     return paths
 
 
-_Job = tuple[Path, SynthesisConfig, int]
-
-
-def _run(jobs: list[_Job], num_workers: int) -> Iterator[Path]:
+def _run(
+    render: Callable[[int], Path], seeds: Sequence[int], num_workers: int
+) -> Iterator[Path]:
     if num_workers <= 1:
-        yield from map(_render_into, jobs)
+        yield from map(render, seeds)
         return
     # spawn: a forked child would inherit the threads of open3d half alive
     with multiprocessing.get_context("spawn").Pool(num_workers) as pool:
-        yield from pool.imap(_render_into, jobs)
-        # a worker that is told to stop would print a stack (pycolmap's signal handler)
+        yield from pool.imap(render, seeds)
+        # a terminated worker would print a stack (pycolmap's signal handler)
         pool.close()
         pool.join()
 
 
-def _render_into(job: _Job) -> Path:
-    output, config, seed = job
+def _render_into(output: Path, config: SynthesisConfig, seed: int) -> Path:
     path = output / f"room_{seed:06d}"
     if path.exists():
         return path

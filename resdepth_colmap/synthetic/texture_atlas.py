@@ -1,4 +1,4 @@
-"""Textures, looked up where rays hit: filtered, so that nothing flickers."""
+"""Texture lookup, filtered by mip levels."""
 
 from collections.abc import Sequence
 
@@ -34,31 +34,29 @@ class Atlas:
                 half = max(len(level) // 2, 1)
                 level = area_resized(level, (half, half))
         self._texels = np.concatenate(levels)
-        # what a screen shows to what a surface reflects
+        # sRGB to linear reflectance
         self._linear = (np.arange(256, dtype=np.float32) / 255) ** 2.2
 
-    def sample(self, texture: Indices, place: Floats, width: Floats) -> Floats:
-        """Colours, bilinear in the nearest mip level.
+    def sample(self, texture: Indices, uv: Floats, width: Floats) -> Floats:
+        """Reflectance, bilinear in the nearest mip level.
 
         Args:
-            texture: Which texture, shape (N,).
-            place: Where, shape (N, 2), in repeats of the texture.
-            width: Side of what a ray sees there, shape (N,), in repeats.
+            texture: Index of the texture, shape (N,).
+            uv: Texture coordinates, shape (N, 2), in repeats of the texture.
+            width: Side of the footprint of a ray, shape (N,), in repeats.
 
         Returns:
             Reflected share of the light (linear), shape (N, 3).
         """
         full = self._sizes[texture]
         blur = np.log2(np.maximum(width * full, 1.0))
-        level = np.minimum(
-            np.round(blur).astype(np.int64), np.log2(full).astype(np.int64)
-        )
+        level = np.minimum(np.round(blur), np.log2(full)).astype(np.int64)
         size = full >> level
         base = self._base[texture, level]
-        xy = (place % 1.0) * size[:, None] - 0.5
+        xy = (uv % 1.0) * size[:, None] - 0.5
         corner = np.floor(xy).astype(np.int64)
         share = (xy - corner).astype(np.float32)
-        color = np.zeros((len(place), 3), dtype=np.float32)
+        color = np.zeros((len(uv), 3), dtype=np.float32)
         for dx, wx in ((0, 1 - share[:, 0]), (1, share[:, 0])):
             x = (corner[:, 0] + dx) & (size - 1)
             for dy, wy in ((0, 1 - share[:, 1]), (1, share[:, 1])):

@@ -1,9 +1,10 @@
-"""Procedural surfaces: square pictures that repeat without a seam.
+"""Procedural textures: square pictures that repeat without a seam.
 
-Natural pictures have 1/f spectra and occlusion edges; spectral noise and dead leaves
-(Lee, Mumford, Huang 2001) have both and cost next to nothing, so much is made of them.
+Natural images have 1/f spectra and occlusion edges. Spectral noise and dead leaves
+(Lee, Mumford, Huang 2001) have both at little cost; most textures are made of them.
 """
 
+import itertools
 from collections.abc import Callable
 
 import cv2
@@ -12,15 +13,16 @@ import numpy.typing as npt
 
 Rng = np.random.Generator
 Picture = npt.NDArray[np.float32]
-"""Colours in 0..1 as a screen shows them (sRGB), shape (S, S, 3)."""
+"""Colours in 0..1 (sRGB), shape (S, S, 3)."""
 Field = npt.NDArray[np.float32]
-"""One value a texel, shape (S, S)."""
+"""One value per texel, shape (S, S)."""
 Maker = Callable[[Rng, int], Picture]
+"""Makes one random texture with a given side in texels."""
 
 
 def color(rng: Rng) -> npt.NDArray[np.float32]:
-    """One surface colour: mostly muted, sometimes vivid, shape (3,)."""
-    warm = rng.random() < 0.5  # wood, skin, clay, paper: indoors is warm
+    """A surface colour: mostly muted, sometimes vivid, shape (3,)."""
+    warm = rng.random() < 0.5  # wood, skin, clay, paper: indoor colours are warm
     hue = rng.normal(0.55, 0.3) if warm else rng.uniform(0, 6)
     saturation = rng.beta(1.1, 4.0) if rng.random() < 0.8 else rng.uniform(0.4, 0.9)
     value = rng.uniform(0.18, 0.95)
@@ -30,7 +32,7 @@ def color(rng: Rng) -> npt.NDArray[np.float32]:
 
 
 def palette(rng: Rng, count: int) -> npt.NDArray[np.float32]:
-    """Colours that go together, or not, shape (count, 3)."""
+    """Colours, more or less similar, shape (count, 3)."""
     base = color(rng)
     spread = rng.choice([0.1, 0.3, 0.6, 1.0])
     others = np.stack([color(rng) for _ in range(count)])
@@ -53,44 +55,35 @@ def spectral(rng: Rng, size: int, slope: float, stretch: float = 1.0) -> Field:
 
 
 def _ramp(colors: npt.NDArray[np.float32], field: Field) -> Picture:
-    """Colours in order along 0..1."""
-    place = np.clip(field, 0, 1) * (len(colors) - 1)
-    index = np.minimum(place.astype(np.int64), len(colors) - 2)
-    share = (place - index)[..., None]
-    return np.asarray(
-        colors[index] * (1 - share) + colors[index + 1] * share, np.float32
-    )
-
-
-def _flat(rng: Rng, size: int) -> Picture:
-    return np.broadcast_to(color(rng), (size, size, 3)).copy()
+    """Colours interpolated along 0..1."""
+    position = np.clip(field, 0, 1) * (len(colors) - 1)
+    index = np.minimum(position.astype(np.int64), len(colors) - 2)
+    share = (position - index)[..., None]
+    mixed = colors[index] * (1 - share) + colors[index + 1] * share
+    return np.asarray(mixed, np.float32)
 
 
 def _uniform(rng: Rng, size: int) -> Picture:
-    return _flat(rng, size)
+    return np.broadcast_to(color(rng), (size, size, 3)).copy()
 
 
 def _faint(rng: Rng, size: int) -> Picture:
     noise = spectral(rng, size, rng.uniform(0.2, 1.6))
-    picture: Picture = _flat(rng, size) * (
-        1 + rng.uniform(0.006, 0.04) * noise[..., None]
-    )
-    return picture
+    plain = _uniform(rng, size)
+    return np.asarray(plain * (1 + rng.uniform(0.006, 0.04) * noise[..., None]))
 
 
 def _plaster(rng: Rng, size: int) -> Picture:
     height = spectral(rng, size, rng.uniform(0.6, 1.3))
     relief = height - np.roll(height, (1, 1), (0, 1))
     shade = 1 + rng.uniform(0.01, 0.09) * relief / max(float(relief.std()), 1e-6)
-    picture: Picture = _flat(rng, size) * shade[..., None]
-    return picture
+    return np.asarray(_uniform(rng, size) * shade[..., None])
 
 
 def _stains(rng: Rng, size: int) -> Picture:
     blotch = np.clip(spectral(rng, size, rng.uniform(1.2, 2.0)) - 0.4, 0, 1.5)
     amount = (rng.uniform(0.1, 0.5) * blotch)[..., None]
-    picture: Picture = _faint(rng, size) * (1 - amount) + color(rng) * amount
-    return picture
+    return np.asarray(_faint(rng, size) * (1 - amount) + color(rng) * amount)
 
 
 def _cloudy(rng: Rng, size: int) -> Picture:
@@ -103,10 +96,8 @@ def _grain(rng: Rng, size: int) -> Picture:
     """Carpet, felt, granite, sand: fine and strong."""
     layers = [spectral(rng, size, rng.uniform(0, 0.9)) for _ in range(3)]
     mixing = rng.normal(size=(3, 3)) * rng.uniform(0.02, 0.06) + rng.uniform(0.02, 0.12)
-    picture: Picture = _flat(rng, size) + np.stack(layers, 2) @ mixing.astype(
-        np.float32
-    )
-    return picture
+    grain = np.stack(layers, 2) @ mixing.astype(np.float32)
+    return np.asarray(_uniform(rng, size) + grain)
 
 
 def _wood(rng: Rng, size: int) -> Picture:
@@ -117,10 +108,8 @@ def _wood(rng: Rng, size: int) -> Picture:
     fibre = spectral(rng, size, 0.6, stretch=rng.uniform(10, 40))
     dark = np.array([0.30, 0.18, 0.09]) * rng.uniform(0.5, 2.0)
     light = dark + np.array([0.30, 0.24, 0.16]) * rng.uniform(0.2, 1.4)
-    picture = _ramp(
-        np.stack([dark, light]).astype(np.float32),
-        (wave ** rng.uniform(0.5, 2)).astype(np.float32),
-    )
+    colors = np.stack([dark, light]).astype(np.float32)
+    picture = _ramp(colors, (wave ** rng.uniform(0.5, 2)).astype(np.float32))
     picture *= 1 + rng.uniform(0.03, 0.12) * fibre[..., None]
     if rng.random() < 0.5:
         planks = int(rng.choice([2, 4, 8]))
@@ -145,44 +134,33 @@ def _camouflage(rng: Rng, size: int) -> Picture:
 
 
 def _leaf(rng: Rng, radius: float) -> npt.NDArray[np.float64]:
-    """Outline of one leaf round the origin: disc, ellipse, polygon or rectangle."""
+    """Outline of a leaf about the origin: disc, ellipse, polygon or rectangle."""
     corners = int(rng.choice([3, 4, 4, 5, 7, 20, 20]))
     angle = np.linspace(0, 2 * np.pi, corners, endpoint=False) + rng.uniform(0, 6.3)
     reach = radius * (1 if corners == 20 else rng.uniform(0.5, 1.2, corners))
     shape = np.stack([np.cos(angle), np.sin(angle) * rng.uniform(0.25, 1)], 1)
     turn = rng.uniform(0, np.pi)
     c, s = np.cos(turn), np.sin(turn)
-    outline: npt.NDArray[np.float64] = (np.reshape(reach, (-1, 1)) * shape) @ [
-        [c, s],
-        [-s, c],
-    ]
-    return outline
+    return np.asarray((np.reshape(reach, (-1, 1)) * shape) @ [[c, s], [-s, c]])
 
 
 def _draw_wrapped(
     picture: Picture, outline: npt.NDArray[np.float64], tone: npt.NDArray[np.float32]
 ) -> None:
     size = len(picture)
-    low, high = outline.min(axis=0), outline.max(axis=0)
-    for dx in (-size, 0, size):
-        for dy in (-size, 0, size):
-            if (
-                high[0] + dx < 0
-                or low[0] + dx > size
-                or high[1] + dy < 0
-                or low[1] + dy > size
-            ):
-                continue
+    (x0, y0), (x1, y1) = outline.min(axis=0), outline.max(axis=0)
+    for dx, dy in itertools.product((-size, 0, size), repeat=2):
+        if x1 + dx >= 0 and x0 + dx <= size and y1 + dy >= 0 and y0 + dy <= size:
             points = np.round((outline + np.array([dx, dy])) * 16).astype(np.int32)
             cv2.fillPoly(picture, [points], tone.tolist(), cv2.LINE_AA, 4)
 
 
 def dead_leaves(rng: Rng, size: int, count: int = 500) -> Picture:
-    """Leaves that hide each other, their radii drawn from r^-3, each with a texture."""
+    """Leaves that occlude each other, with radii of density r^-3."""
     picture = np.ascontiguousarray(np.broadcast_to(color(rng), (size, size, 3)))
     colors = palette(rng, 24)
     smallest, largest = size * rng.uniform(0.006, 0.02), size * rng.uniform(0.1, 0.35)
-    share = np.sort(rng.uniform(0, 1, count))  # large ones first, or none small is left
+    share = np.sort(rng.uniform(0, 1, count))  # small leaves last, on top
     radii = (largest**-2 + share * (smallest**-2 - largest**-2)) ** -0.5
     order = radii[rng.permutation(count)] if rng.random() < 0.3 else radii
     for radius in order:
@@ -196,16 +174,14 @@ def dead_leaves(rng: Rng, size: int, count: int = 500) -> Picture:
 
 
 def _scribbles(rng: Rng, size: int) -> Picture:
-    """A map, a drawing: thin curved lines on a quiet ground."""
-    picture = np.ascontiguousarray(
-        _cloudy(rng, size) if rng.random() < 0.3 else _flat(rng, size)
-    )
+    """A map, a drawing: thin curved lines on a plain ground."""
+    ground = _cloudy if rng.random() < 0.3 else _uniform
+    picture = np.ascontiguousarray(ground(rng, size))
     colors = palette(rng, 6) * rng.choice([0.3, 1.0])
     for _ in range(int(rng.integers(10, 120))):
         steps = rng.normal(0, size * 0.03, (30, 2)).cumsum(axis=0)
-        path = np.cumsum(steps, axis=0) * rng.uniform(0.05, 0.3) + rng.uniform(
-            0, size, 2
-        )
+        path = np.cumsum(steps, axis=0) * rng.uniform(0.05, 0.3)
+        path += rng.uniform(0, size, 2)
         width = int(rng.integers(1, max(size // 100, 2)))
         points = [np.round(path * 16).astype(np.int32)]
         tone = colors[rng.integers(6)].tolist()
@@ -236,27 +212,22 @@ def _text_lines(rng: Rng, size: int) -> npt.NDArray[np.uint8]:
     while y < size * 0.97:
         scale = size / 512 * (rng.uniform(1, 3) if rng.random() < 0.12 else usual)
         y += 26 * scale
-        text = "".join(
-            rng.choice(letters, int(size * rng.uniform(0.6, 0.92) / (18 * scale)))
-        )
-        place = (int(size * 0.04), int(y))
-        cv2.putText(
-            ink, text, place, font, scale, 255, max(int(1.5 * scale), 1), cv2.LINE_AA
-        )
+        count = int(size * rng.uniform(0.6, 0.92) / (18 * scale))
+        text = "".join(rng.choice(letters, count))
+        start, width = (int(size * 0.04), int(y)), max(int(1.5 * scale), 1)
+        cv2.putText(ink, text, start, font, scale, 255, width, cv2.LINE_AA)
         y += 12 * scale
     return ink
 
 
 def _poster(rng: Rng, size: int) -> Picture:
     """A painting or photograph: soft large shapes, sharp small ones, shading."""
-    picture = cv2.GaussianBlur(
-        dead_leaves(rng, size, 40), (0, 0), size * rng.uniform(0.002, 0.03)
-    )
+    large = dead_leaves(rng, size, 40)
+    soft = cv2.GaussianBlur(large, (0, 0), size * rng.uniform(0.002, 0.03))
     sharp = dead_leaves(rng, size, 300)
     field = spectral(rng, size, 1.8)[..., None]
     blend = np.clip(0.5 + 3 * (field - rng.uniform(-0.8, 0.8)), 0, 1)
-    mixed: Picture = picture * blend + sharp * (1 - blend)
-    return mixed
+    return np.asarray(soft * blend + sharp * (1 - blend))
 
 
 def _pixels(rng: Rng, size: int) -> Picture:

@@ -1,4 +1,4 @@
-"""Things with thin parts, and bent or hanging ones: where stereo has it hardest."""
+"""Objects that are hard for stereo: thin, bent or hanging."""
 
 import numpy as np
 
@@ -14,12 +14,8 @@ def pipes(rng: Rng) -> Mesh:
         radius = rng.uniform(0.008, 0.06)
         knots = [rng.uniform([-0.3, -0.3, 0.1], [0.3, 0.3, 0.7])]
         for _ in range(int(rng.integers(2, 7))):
-            step = (
-                np.eye(3)[rng.integers(3)]
-                * rng.choice([-1, 1])
-                * rng.uniform(0.15, 0.7)
-            )
-            knots.append(knots[-1] + step)
+            axis, sign = np.eye(3)[rng.integers(3)], rng.choice([-1, 1])
+            knots.append(knots[-1] + axis * sign * rng.uniform(0.15, 0.7))
         path = _rounded(np.array(knots), radius * 3)
         parts.append(meshes.tube(path, radius, sides=14))
         if rng.random() < 0.5:
@@ -29,7 +25,7 @@ def pipes(rng: Rng) -> Mesh:
 
 
 def _rounded(knots: Matrix, radius: float) -> Matrix:
-    """A path whose corners are cut by a curve."""
+    """A path with rounded corners."""
     points = [knots[0]]
     for before, corner, after in zip(knots, knots[1:], knots[2:], strict=False):
         reach = min(radius, 0.45 * float(np.linalg.norm(before - corner)))
@@ -43,16 +39,14 @@ def _rounded(knots: Matrix, radius: float) -> Matrix:
 
 
 def _unit(vector: Matrix) -> Matrix:
-    unit: Matrix = vector / max(float(np.linalg.norm(vector)), 1e-12)
-    return unit
+    return np.asarray(vector / max(float(np.linalg.norm(vector)), 1e-12))
 
 
 def plant(rng: Rng) -> Mesh:
     """A pot with many leaves on stems, or many blades of grass."""
     pot_height = rng.uniform(0.08, 0.25)
-    pot = meshes.cylinder(
-        pot_height * 0.4, pot_height, pot_height * rng.uniform(0.45, 0.7)
-    )
+    rim = pot_height * rng.uniform(0.45, 0.7)
+    pot = meshes.cylinder(pot_height * 0.4, pot_height, rim)
     height = rng.uniform(0.2, 0.9)
     leaf_length, leaf_width = rng.uniform([0.06, 0.15], [0.3, 0.6])
     parts = []
@@ -60,13 +54,10 @@ def plant(rng: Rng) -> Mesh:
         out = np.array([*rng.normal(0, 0.25, 2), rng.uniform(0.3, 1)]) * height
         start = np.array([*rng.normal(0, 0.02, 2), pot_height * 0.9])
         knots = np.array([start, start + out * [0.3, 0.3, 0.6], start + out])
-        parts.append(
-            meshes.tube(meshes.smooth_path(knots, 8), 0.003, sides=5).slotted(1)
-        )
+        stem = meshes.tube(meshes.smooth_path(knots, 8), 0.003, sides=5)
         direction = _unit(out * [1, 1, rng.uniform(-0.6, 0.8)])
-        parts.append(
-            _leaf(rng, start + out, direction, leaf_length, leaf_width).slotted(2)
-        )
+        leaf = _leaf(rng, start + out, direction, leaf_length, leaf_width)
+        parts += [stem.slotted(1), leaf.slotted(2)]
     return merge([pot, *parts])
 
 
@@ -90,11 +81,10 @@ def lamp(rng: Rng) -> Mesh:
     foot = meshes.cylinder(shade * 0.8, 0.03)
     stem = meshes.rod([0, 0, 0], [0, 0, height], rng.uniform(0.006, 0.02))
     low, high = shade, shade * rng.uniform(0.3, 1)
-    profile = np.array(
-        [[low, 0], [high, shade * 1.5], [high * 0.97, shade * 1.5], [low * 0.97, 0]]
-    )
-    cover = meshes.revolve(profile).moved([0, 0, height - shade * 0.5]).slotted(1)
-    return merge([foot, stem, cover])
+    top = shade * 1.5
+    profile = np.array([[low, 0], [high, top], [high * 0.97, top], [low * 0.97, 0]])
+    cover = meshes.revolve(profile).moved([0, 0, height - shade * 0.5])
+    return merge([foot, stem, cover.slotted(1)])
 
 
 def easel(rng: Rng) -> Mesh:
@@ -111,15 +101,13 @@ def picture_frame(rng: Rng) -> Mesh:
     """A framed picture; its back lies in the plane y = 0."""
     width, height = rng.uniform(0.15, 0.9, 2)
     rim, deep = rng.uniform([0.01, 0.01], [0.06, 0.05])
-    parts = [meshes.box([width, 0.008, height]).moved([0, -0.004, 0])]
-    for size, place in (
-        ([width + 2 * rim, deep, rim], [0, -rim]),
-        ([width + 2 * rim, deep, rim], [0, height]),
-        ([rim, deep, height], [-(width + rim) / 2, 0]),
-        ([rim, deep, height], [(width + rim) / 2, 0]),
-    ):
-        parts.append(meshes.box(size).moved([place[0], -deep / 2, place[1]]).slotted(1))
-    return merge(parts)
+    side = (width + rim) / 2
+    across = meshes.box([width + 2 * rim, deep, rim])
+    up = meshes.box([rim, deep, height])
+    edges = [(across, 0, -rim), (across, 0, height), (up, -side, 0), (up, side, 0)]
+    frame = merge(edge.moved([x, -deep / 2, z]) for edge, x, z in edges)
+    panel = meshes.box([width, 0.008, height]).moved([0, -0.004, 0])
+    return merge([panel, frame.slotted(1)])
 
 
 def curtain(rng: Rng) -> Mesh:
@@ -127,19 +115,19 @@ def curtain(rng: Rng) -> Mesh:
     width, height = rng.uniform([0.4, 0.8], [1.8, 2.2])
     x = np.linspace(-width / 2, width / 2, 90)[None, :]
     z = np.linspace(0, height, 20)[:, None]
-    place = np.stack(np.broadcast_arrays(x * 1.0, z * 0.25), axis=2)
-    fold = meshes.waves(rng, place, rng.uniform(0.12, 0.6), 3)
+    position = np.stack(np.broadcast_arrays(x * 1.0, z * 0.25), axis=2)
+    fold = meshes.waves(rng, position, rng.uniform(0.12, 0.6), 3)
     depth = rng.uniform(0.02, 0.08) * fold * (1.2 - 0.6 * z / height)
     return meshes.sheet(np.stack(np.broadcast_arrays(x, depth, z), axis=2))
 
 
 def cloth(rng: Rng) -> Mesh:
-    """A crumpled cloth lying, or thrown over something round."""
+    """A crumpled cloth, flat or over something round."""
     side = rng.uniform(0.25, 0.9)
     line = np.linspace(-side / 2, side / 2, 60)
     x, y = np.meshgrid(line, line * rng.uniform(0.5, 1))
-    place = np.stack([x, y], axis=2)
-    wrinkle = meshes.waves(rng, place, side * rng.uniform(0.3, 0.9), 4)
+    position = np.stack([x, y], axis=2)
+    wrinkle = meshes.waves(rng, position, side * rng.uniform(0.3, 0.9), 4)
     hill = np.exp(-(x**2 + y**2) / (0.1 * side**2)) * rng.uniform(0, 0.3)
     z = np.maximum(0.02 + hill + side * rng.uniform(0.02, 0.12) * wrinkle, 0.003 * side)
     return meshes.sheet(np.stack([x, y, z], axis=2))
@@ -155,9 +143,8 @@ def relief(rng: Rng) -> Mesh:
         spread = rng.uniform(0.002, 0.03)
         mirror = rng.random() < 0.5
         for sign in (-1, 1) if mirror else (1,):
-            bulge += rng.normal(0, 0.12) * np.exp(
-                -((x - sign * cx) ** 2 + (z - cz) ** 2) / spread
-            )
+            distance2 = (x - sign * cx) ** 2 + (z - cz) ** 2
+            bulge += rng.normal(0, 0.12) * np.exp(-distance2 / spread)
     bulge += 0.3 * np.sqrt(np.clip(0.25 - x**2, 0, 1)) * rng.integers(0, 2)
     grid = np.stack([x * width, -bulge * min(width, height), z * height], axis=2)
     back = meshes.box([width, 0.02, height]).moved([0, 0.03, 0])
@@ -171,9 +158,8 @@ def wires(rng: Rng) -> Mesh:
         spread = rng.uniform(0.15, 0.6)
         knots = rng.uniform(-spread, spread, (int(rng.integers(4, 9)), 3))
         knots[:, 2] = np.abs(knots[:, 2]) * rng.choice([0.05, 0.5, 1.5]) + 0.01
-        parts.append(
-            meshes.tube(meshes.smooth_path(knots, 80), rng.uniform(0.002, 0.012), 7)
-        )
+        path = meshes.smooth_path(knots, 80)
+        parts.append(meshes.tube(path, rng.uniform(0.002, 0.012), 7))
     return merge(parts)
 
 
@@ -200,13 +186,7 @@ def lattice(rng: Rng) -> Mesh:
         meshes.rod([-width / 2, 0, z], [width / 2, 0, z], radius)
         for z in np.linspace(height * 0.05, height, up)
     ]
-    lean = rng.uniform(-0.3, 0.3)
-    c, s = np.cos(lean), np.sin(lean)
-    return (
-        merge(parts)
-        .moved([0, 0, 0], np.array([[1, 0, 0], [0, c, -s], [0, s, c]]))
-        .seated()
-    )
+    return merge(parts).rotated(meshes.turn(0, rng.uniform(-0.3, 0.3))).seated()
 
 
 def basket(rng: Rng) -> Mesh:
@@ -217,10 +197,8 @@ def basket(rng: Rng) -> Mesh:
         for z in np.linspace(0.005, height, int(rng.integers(2, 6)))
     ]
     angles = np.linspace(0, 2 * np.pi, int(rng.integers(8, 30)), endpoint=False)
-    bars = [
-        meshes.rod([radius * c, radius * s, 0], [radius * c, radius * s, height], 0.004)
-        for c, s in zip(np.cos(angles), np.sin(angles), strict=True)
-    ]
+    ring = radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    bars = [meshes.rod([*xy, 0], [*xy, height], 0.004) for xy in ring]
     return merge([*hoops, *bars])
 
 
@@ -231,9 +209,8 @@ def toy(rng: Rng) -> Mesh:
     for _ in range(int(rng.integers(3, 10))):
         end = _unit(rng.normal(size=3)) * rng.uniform(0.1, 0.28)
         parts.append(meshes.rod([0, 0, 0], end, rng.uniform(0.006, 0.03)))
-        tip = meshes.superquadric(
-            rng.uniform(0.02, 0.12, 3), tuple(rng.uniform(0.2, 1.2, 2)), 14
-        )
+        size, roundness = rng.uniform(0.02, 0.12, 3), rng.uniform(0.2, 1.2, 2)
+        tip = meshes.superquadric(size, tuple(roundness), 14)
         parts.append(tip.moved(end, meshes.random_rotation(rng)))
     return merge(parts, keep_slots=False).seated()
 

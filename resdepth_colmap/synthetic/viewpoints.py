@@ -1,7 +1,8 @@
-"""Where the cameras stand: mostly good photographers, now and then a bad one."""
+"""The poses of the cameras: mostly well chosen, sometimes badly."""
 
 import dataclasses
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,9 +18,8 @@ _PROBE_WIDTH_PX = 48
 _NEAREST_OF_MEDIAN = 0.3
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
-class _Stand:
-    """A first camera place: where it is, what it looks at, what is around."""
+class _Stand(NamedTuple):
+    """The pose of the first camera: its centre, the point that it faces, its lens."""
 
     eye: Matrix
     target: Matrix
@@ -29,17 +29,17 @@ class _Stand:
 def choose_views(
     rng: Rng, room: Room, config: SynthesisConfig, probe: Probe
 ) -> tuple[View, ...]:
-    """Views of a room that stand in free space and overlap.
+    """Overlapping views of a room, with free space in front of each.
 
     Args:
-        rng: Everything random comes from it.
-        room: What to look at.
+        rng: Source of randomness.
+        room: The room.
         config: Number and size of the views.
-        probe: Gives the exact depth of a (small) view.
+        probe: Renders the exact depth of a (small) view.
 
     Returns:
-        The views, names 0000.png and so on, ids from 1. If no attempt gave every view
-        free space in front, the best one.
+        The views, names 0000.png and so on, ids from 1. If no attempt has free space in
+        front of every view, those of the best attempt.
     """
     best: tuple[View, ...] = ()
     best_score = -1.0
@@ -57,22 +57,19 @@ def choose_views(
     return best
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class _Plan:
-    """How the views lie: pattern, angle from one to the next, how they turn."""
+class _Plan(NamedTuple):
+    """Relative poses: pattern, angle from one view to the next, rotations."""
 
     pattern: str
-    step_deg: float
-    converge: float
-    wobble_deg: float
-    roll_deg: float
+    step_deg: float = 0.0
+    converge: float = 0.0
+    wobble_deg: float = 0.0
+    roll_deg: float = 0.0
 
 
 def _draw_plan(rng: Rng, num_views: int) -> _Plan:
     if rng.random() < (0.35 if num_views == 2 else 0.1):
-        return _Plan(
-            pattern="rectified", step_deg=0, converge=0, wobble_deg=0, roll_deg=0
-        )
+        return _Plan("rectified")
     widest = 9.0 if num_views <= 3 else 7.0
     step = float(np.exp(rng.uniform(np.log(1.5), np.log(widest))))
     pattern = str(rng.choice(["line", "line", "arc", "cloud", "cloud", "forward"]))
@@ -107,9 +104,7 @@ def _draw_stand(rng: Rng, room: Room, config: SynthesisConfig) -> _Stand:
         cx=float(config.width_px / 2 + shift[0]),
         cy=float(config.height_px / 2 + shift[1]),
     )
-    return _Stand(
-        eye=eye, target=room.focus + rng.normal(0, 0.6, 3) * spread, camera=camera
-    )
+    return _Stand(eye, room.focus + rng.normal(0, 0.6, 3) * spread, camera)
 
 
 def _near_and_median(depth: DepthMap) -> tuple[float, float]:
@@ -129,10 +124,13 @@ def _views(
     if plan.pattern == "rectified":
         disparity = rng.uniform(15, 90) * stand.camera.width_px / 640
         step = disparity * near / stand.camera.fx
-        return tuple(_shifted(first, i, i * step * right) for i in range(count))
-    offsets = (
-        _offsets(rng, plan.pattern, count) * np.tan(np.radians(plan.step_deg)) * median
-    )
+        rotation, eye = first.cam_from_world[:, :3], first.center_in_world
+        return tuple(
+            _posed(i, first.camera, rotation, eye + i * step * right)
+            for i in range(count)
+        )
+    slope = np.tan(np.radians(plan.step_deg))
+    offsets = _offsets(rng, plan.pattern, count) * slope * median
     middle = stand.eye + median * forward
     views = []
     for index, (x, y, z) in enumerate(offsets):
@@ -147,14 +145,13 @@ def _views(
 
 
 def _offsets(rng: Rng, pattern: str, count: int) -> Matrix:
-    """Places (count, 3) in steps along right, down and forward."""
+    """Centres of the cameras, shape (count, 3), in steps right, down and forward."""
     along = np.arange(count) - (count - 1) / 2
     jitter: Matrix = rng.normal(0, 0.15, (count, 3))
     if pattern == "forward":
         side = rng.uniform(0.2, 0.7, 2)
-        return (
-            np.stack([side[0] * along, 0.3 * side[1] * along, along * 1.2], 1) + jitter
-        )
+        parts = [side[0] * along, 0.3 * side[1] * along, along * 1.2]
+        return np.stack(parts, axis=1) + jitter
     if pattern == "cloud":
         radius = 0.6 * np.sqrt(count)
         reach = np.array([1.0, 0.6, 0.35]) * radius
@@ -171,21 +168,14 @@ def _view(index: int, camera: Camera, eye: Matrix, target: Matrix, roll: float) 
     down = np.cross(forward, right)
     c, s = np.cos(roll), np.sin(roll)
     rotation = np.stack([c * right + s * down, c * down - s * right, forward])
+    return _posed(index, camera, rotation, eye)
+
+
+def _posed(index: int, camera: Camera, rotation: Matrix, eye: Matrix) -> View:
     return View(
         image_id=index + 1,
         name=f"{index:04d}.png",
         camera=camera,
-        cam_from_world=np.column_stack([rotation, -rotation @ eye]),
-    )
-
-
-def _shifted(view: View, index: int, shift: Matrix) -> View:
-    rotation = view.cam_from_world[:, :3]
-    eye = view.center_in_world + shift
-    return dataclasses.replace(
-        view,
-        image_id=index + 1,
-        name=f"{index:04d}.png",
         cam_from_world=np.column_stack([rotation, -rotation @ eye]),
     )
 
@@ -197,7 +187,7 @@ def _small(view: View) -> View:
 
 
 def _freedom(view: View, room: Room, probe: Probe) -> float:
-    """How free the view is: 1 and more is good, 0 means inside something."""
+    """Free space in front of a view: 1 and more is enough, 0 is inside an object."""
     eye = view.center_in_world
     if np.any(eye < room.low + 0.05) or np.any(eye > room.high - 0.05):
         return 0.0

@@ -1,4 +1,4 @@
-"""The shell of a room, and what hangs on it."""
+"""The shell of a room, and the objects on its walls."""
 
 import dataclasses
 
@@ -43,7 +43,7 @@ def add_shell(builder: SceneBuilder, low: Matrix, high: Matrix) -> None:
 
 
 def _wall(rng: Rng, corner: Matrix, along: Matrix, up: Matrix, inward: Matrix) -> Mesh:
-    """A wall with its skirting board; about half have an opening too."""
+    """A wall with its skirting board; about half also have an opening."""
     if rng.random() < 0.5:
         parts = _open_wall(rng, corner, along, up, inward)
     else:
@@ -57,7 +57,7 @@ def _wall(rng: Rng, corner: Matrix, along: Matrix, up: Matrix, inward: Matrix) -
 def _open_wall(
     rng: Rng, corner: Matrix, along: Matrix, up: Matrix, inward: Matrix
 ) -> list[Mesh]:
-    """Slot 0: the wall round an alcove, door or window; 1: its back; 2: its sides."""
+    """Slot 0: a wall with an alcove, door or window; 1: its back; 2: its sides."""
     length, height = float(np.linalg.norm(along)), float(up[2])
     direction = along / length
     left, right = np.sort(rng.uniform(0.1, 0.9, 2)) * length
@@ -65,12 +65,9 @@ def _open_wall(
     bottom = float(rng.choice([_SKIRTING, 0.3 * height]))
     top = rng.uniform(0.7, 0.9) * height
     back = -inward * rng.uniform(0.08, 0.6)
-    panels = [
-        _panel((0, left, 0, height), corner, direction),
-        _panel((right, length, 0, height), corner, direction),
-        _panel((left, right, top, height), corner, direction),
-        _panel((left, right, 0, bottom), corner, direction),
-    ]
+    beside = [(0.0, left, 0.0, height), (right, length, 0.0, height)]
+    between = [(left, right, top, height), (left, right, 0.0, bottom)]
+    panels = [_panel(span, corner, direction) for span in beside + between]
     start = corner + left * direction + bottom * _UP
     wide, tall = (right - left) * direction, (top - bottom) * _UP
     pane = meshes.rectangle(start + back, wide, tall, _CELL)
@@ -86,7 +83,7 @@ def _open_wall(
 def _panel(
     span: tuple[float, float, float, float], corner: Matrix, direction: Matrix
 ) -> Mesh:
-    """A piece of a wall, its texture in line with that of the other pieces."""
+    """A piece of a wall; the texture continues from piece to piece."""
     u0, u1, v0, v1 = span
     start = corner + u0 * direction + v0 * _UP
     panel = meshes.rectangle(start, (u1 - u0) * direction, (v1 - v0) * _UP, _CELL)
@@ -94,10 +91,10 @@ def _panel(
 
 
 def dress_walls(builder: SceneBuilder, high: Matrix) -> None:
-    """Pictures, shelves, curtains and pipes; half of them on the wall at +y.
+    """Add pictures, shelves, curtains and pipes, half of them on the wall at +y.
 
     Args:
-        builder: Takes them.
+        builder: The scene to add them to.
         high: Upper corner of the room, shape (3,), metres; the lower one mirrors it.
     """
     rng = builder.rng
@@ -107,7 +104,6 @@ def dress_walls(builder: SceneBuilder, high: Matrix) -> None:
         quarter = int(rng.integers(4)) if rng.random() < 0.5 else 0
         across, away = high[:2] if quarter % 2 == 0 else high[1::-1]
         depth = away - 0.03 - float(thing.vertices[:, 1].max())
-        hung = thing.moved(
-            [rng.uniform(-0.8, 0.8) * across, depth, free * rng.random()]
-        )
-        builder.add(hung.moved([0, 0, 0], meshes.turn_z(quarter * np.pi / 2)))
+        shift = [rng.uniform(-0.8, 0.8) * across, depth, free * rng.random()]
+        turn = meshes.turn_z(quarter * np.pi / 2)
+        builder.add(thing.moved(shift).rotated(turn))

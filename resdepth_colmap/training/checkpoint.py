@@ -1,4 +1,4 @@
-"""The state of a training on disk: what a stopped one goes on from."""
+"""The state of a training on disk, from which a stopped training resumes."""
 
 import dataclasses
 import io
@@ -28,21 +28,21 @@ FREE_TO_CHANGE = (
     "tensorboard",
     "samples",
 )
-"""Options that do not change which steps are taken."""
+"""Options that may differ when a training resumes: they do not change its steps."""
 
 logger = logging.getLogger(__name__)
 
 
 @dataclasses.dataclass(kw_only=True)
 class Position:
-    """How far a training is.
+    """Position of a training.
 
     Attributes:
-        step: Steps taken.
-        loss_sum: Sum of their losses since the last line of the log.
-        loss_count: Number of these.
+        step: Number of steps taken.
+        loss_sum: Sum of the losses since the last line of the log.
+        loss_count: Number of these losses.
         best_score: Least score of a validation so far; infinite before the first.
-        samples_key: Tells the samples that the steps were taken with from others.
+        samples_key: Hash of the samples that the steps were taken with.
     """
 
     step: int = 0
@@ -60,7 +60,7 @@ def save_state(output: Path, run: Optimisation, position: Position) -> None:
         WeightsError: If a weight is not finite.
     """
     state = {
-        **dataclasses.asdict(position),
+        "position": dataclasses.asdict(position),
         "options": _options(run),
         "network": run.network.state_dict(),
         "optimiser": run.optimiser.state_dict(),
@@ -82,7 +82,7 @@ def save_best(
 
 
 def load_state(output: Path, run: Optimisation) -> Position:
-    """Load the last state, if there is one; says how far it is.
+    """Load the last state, if there is one; returns its position.
 
     Raises:
         TrainingError: If the file is broken, or of a training with other options.
@@ -92,19 +92,18 @@ def load_state(output: Path, run: Optimisation) -> Position:
         return Position()
     try:
         state = torch.load(path, map_location="cpu", weights_only=True)
-    except Exception as error:  # torch raises what unpickling and zip happen to raise
+        position, options = Position(**state["position"]), state["options"]
+    except Exception as error:  # of torch, unpickling, zip, or another version
         raise TrainingError(
             f"{path}: not a readable state ({error}); start in another --output with "
             f"--init {output / WEIGHTS_NAME}."
         ) from error
-    _check_options(path, state.get("options"), run)
+    _check_options(path, options, run)
     run.network.load_state_dict(state["network"])
     run.optimiser.load_state_dict(state["optimiser"])
     run.schedule.load_state_dict(state["schedule"])
-    fields = [field.name for field in dataclasses.fields(Position)]
-    position = Position(**{name: state[name] for name in fields if name in state})
     if run.ranks.is_first:
-        logger.info("Going on after step %d of %s.", position.step, path)
+        logger.info("Resuming after step %d of %s.", position.step, path)
     return position
 
 
@@ -113,19 +112,15 @@ def _options(run: Optimisation) -> dict[str, Any]:
     return {key: options[key] for key in options if key not in FREE_TO_CHANGE}
 
 
-def _check_options(
-    path: Path, earlier: dict[str, Any] | None, run: Optimisation
-) -> None:
-    """A state without options is of an early version, and taken as it is."""
-    now = _options(run)
+def _check_options(path: Path, earlier: dict[str, Any], run: Optimisation) -> None:
     changed = [
-        f"{name} was {earlier[name]}, not {now[name]}"
-        for name in now
-        if earlier and name in earlier and earlier[name] != now[name]
+        f"{name} was {earlier.get(name)}, not {value}"
+        for name, value in _options(run).items()
+        if earlier.get(name) != value
     ]
     if changed:
         raise TrainingError(
-            f"{path}: of a training with other options ({', '.join(changed)}); go on "
+            f"{path}: of a training with other options ({', '.join(changed)}); resume "
             "with the same ones, or start in another --output with "
             f"--init {path.parent / WEIGHTS_NAME}."
         )

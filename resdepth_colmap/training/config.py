@@ -1,4 +1,4 @@
-"""How the network is trained: every option, and the two sets of them with a name."""
+"""The options of the training, and the presets of them."""
 
 import dataclasses
 import enum
@@ -9,28 +9,28 @@ from resdepth_colmap.config import Config, Device, option
 
 
 class Preset(enum.StrEnum):
-    """Options with a name."""
+    """A set of options."""
 
     DEFAULT = "default"
     PAPER = "paper"
 
 
 class Optimiser(enum.StrEnum):
-    """What turns gradients into steps."""
+    """The optimiser."""
 
     ADAM = "adam"  # weight decay is part of the gradient
-    ADAMW = "adamw"  # weight decay is its own
+    ADAMW = "adamw"  # weight decay is decoupled
 
 
 class Precision(enum.StrEnum):
-    """Numbers that the network computes with in training; its weights stay single."""
+    """Number format of the forward and backward pass; weights stay single."""
 
     SINGLE = "single"
     BFLOAT16 = "bfloat16"  # up to twice as fast where the processor knows it
 
 
 class Schedule(enum.StrEnum):
-    """How the learning rate goes."""
+    """Course of the learning rate."""
 
     CONSTANT = "constant"
     ONE_CYCLE = "one-cycle"
@@ -38,46 +38,44 @@ class Schedule(enum.StrEnum):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class TrainConfig(Config):
-    """How the network is trained.
+    """Options of the training.
 
     Attributes:
-        steps: Optimiser steps in all.
-        batch_size: Crops a step, over all processes.
+        steps: Number of optimiser steps.
+        batch_size: Crops per step, over all processes.
         crop_px: Largest side of a crop, in pixels.
-        learning_rate: Of a constant schedule; the peak of one cycle.
-        weight_decay: The optimiser's weight decay.
+        learning_rate: Learning rate; with one-cycle, its peak.
+        weight_decay: Weight decay.
         optimiser: adam (the paper's) or adamw.
-        schedule: Of the learning rate.
-        largest_gradient: Norm that gradients are cut to; 0 = they are not.
-        distance_power: Weigh errors of inverse depth by the refined depth to this
-            power: 2 = errors in units of length count, 1 = relative ones, 0 = the
-            paper's.
-        valid_importance: How much a pixel counts whose depth was measured (and
-            confirmed by another map), to one that was filled in: the rule that keeps
-            what is confirmed looks after the former.
+        schedule: Course of the learning rate.
+        largest_gradient: Norm to which gradients are clipped; 0 = no clipping.
+        distance_power: Weight errors of inverse depth by the refined depth to this
+            power: 2 = absolute errors of depth, 1 = relative ones, 0 = the paper's.
+        valid_importance: Weight of a pixel with measured and consistent depth,
+            relative to a filled one; update gating protects the former anyway.
         log_weight: Weight of the logarithmic term, which keeps small errors small.
         confidence_weight: Weight of the likelihood of the predicted error scale.
-        vary_light: Change brightness and contrast of the crops at random.
+        vary_light: Vary brightness and contrast of the crops.
         holes_share: Share of crops from maps that are filtered, or look like it.
-        checkpoint_steps: Save the state every so many steps.
-        validation_steps: Refine held-out views every so many steps.
+        checkpoint_steps: Steps between two saved states.
+        validation_steps: Steps between two validations.
         validation_share: Share of the scenes that is held out; 0 = none.
         validation_views: Views to refine of the held-out and of the watched scenes.
-        loaders: Processes that read and cut crops ahead of time; 0 = the training's own
-            process does.
-        device: Where to train; torchrun makes it several processes.
+        loaders: Worker processes that load crops ahead of time; 0 = load them in the
+            training process.
+        device: Device to train on.
         precision: single (the paper's) or bfloat16, which is faster on processors with
             AVX512-BF16 or AMX and on GPUs.
         tensorboard: Log for TensorBoard too, where it is installed.
         seed: Seed of weights, crops and order.
-        init: Weights file to start from, with a fresh optimiser; "shipped" = those that
-            come with the package. The network is then the file's. None = random ones.
-        freeze_unet: Train the propagation alone: the U-Net stays as it begins.
-        freeze_norms: Keep the running statistics of the norms, and normalise by them
-            instead of by those of each batch: a gentler way to go on from good weights.
-        outer_iterations: Outer iterations to learn: from 2 on, part of the crops are
-            compared with maps of other views that the initial weights have refined.
-        samples: Folder of prepared samples, which several trainings may share; None =
+        init: Weights file to start from, with a new optimiser; "shipped" = the weights
+            of the package. The network is then that of the file. None = random weights.
+        freeze_unet: Train the propagation alone; the U-Net keeps its weights.
+        freeze_norms: Keep the running statistics of the norms and normalise by them
+            instead of by those of each batch, to preserve good initial weights.
+        outer_iterations: Outer iterations to train for: from 2 on, part of the crops
+            are compared with maps of other views that the initial weights have refined.
+        samples: Folder of prepared samples, which several trainings can share; None =
             one in the output folder.
     """
 
@@ -130,14 +128,14 @@ class TrainConfig(Config):
 
     @classmethod
     def of(cls, preset: Preset, options: dict[str, Any] | None = None) -> Self:
-        """A preset with some options changed.
+        """A preset with some options replaced.
 
         `paper` is the paper's training on ETH3D (section "Network Training"): plain L1
-        on inverse depth that the baseline scales, Adam at a constant rate, batches of
+        on inverse depth scaled by the baseline, Adam at a constant rate, batches of
         four crops, horizontal flips and no other augmentation.
 
         Args:
-            preset: Which one.
+            preset: The preset.
             options: Attributes that differ from it.
 
         Raises:

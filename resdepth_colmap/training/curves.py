@@ -1,4 +1,4 @@
-"""The curves of a training, as a picture."""
+"""The training curves as a picture."""
 
 from collections.abc import Sequence
 
@@ -26,10 +26,10 @@ _PANELS = {
 
 
 def draw_curves(rows: Sequence[Row]) -> ColorImage:
-    """Draw what a log holds over its steps: losses, ratios of errors, learning rate.
+    """Draw losses, ratios of errors and learning rate over the steps.
 
     Args:
-        rows: Lines of the log; a panel without any value is left out.
+        rows: Lines of the log; a panel without values is left out.
 
     Returns:
         RGB values, shape (height, width, 3), uint8.

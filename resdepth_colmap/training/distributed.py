@@ -1,4 +1,4 @@
-"""The processes of one training: alone, or several that torchrun started."""
+"""The processes of one training: one, or several that torchrun starts."""
 
 import contextlib
 import dataclasses
@@ -15,7 +15,7 @@ from resdepth_colmap.errors import BackendUnavailableError, ConfigError
 from resdepth_colmap.network.device import resolve_device
 
 LONGEST_WAIT = datetime.timedelta(days=1)
-"""The others wait while the first process matches and prepares samples."""
+"""Timeout of the other processes while the first one matches and prepares samples."""
 
 Value = TypeVar("Value")
 
@@ -25,9 +25,9 @@ class Ranks:
     """This process among all.
 
     Attributes:
-        rank: Its number, from 0.
-        count: How many there are.
-        device: Where this one computes.
+        rank: Index of this process.
+        count: Number of processes.
+        device: Device of this process.
     """
 
     rank: int = 0
@@ -38,7 +38,7 @@ class Ranks:
 
     @property
     def is_first(self) -> bool:
-        """Whether it is the one that logs, validates and saves."""
+        """Whether this process logs, validates and saves."""
         return self.rank == 0
 
     def summed(self, values: Sequence[float]) -> list[float]:
@@ -50,7 +50,7 @@ class Ranks:
         return [float(value) for value in tensor]
 
     def from_first(self, make: Callable[[], Value]) -> Value:
-        """What the first process makes, in all of them; the others wait for it."""
+        """The result of the first process, in all of them; the others wait for it."""
         if self.count == 1:
             return make()
         box: list[object] = [make() if self.is_first else None]
@@ -58,33 +58,33 @@ class Ranks:
         return cast(Value, box[0])
 
     def check_batch(self, batch_size: int) -> None:
-        """Check that a batch can be dealt out evenly.
+        """Check that a batch divides evenly among the processes.
 
         Raises:
-            ConfigError: If it cannot.
+            ConfigError: If it does not.
         """
         if batch_size % self.count:
             raise ConfigError(
                 f"{batch_size=} but expected a multiple of the {self.count} processes "
-                "that torchrun started."
+                "of torchrun."
             )
 
 
 def is_first_process() -> bool:
-    """Whether this process is alone or the first one of torchrun's."""
+    """Whether this process is the only one or the first one of torchrun."""
     return os.environ.get("RANK", "0") == "0"
 
 
 @contextlib.contextmanager
 def join_ranks(device: Device) -> Iterator[Ranks]:
-    """Join the processes that torchrun started; without torchrun there is but one.
+    """Join the processes of torchrun; without torchrun there is only this one.
 
     Args:
-        device: Where to compute. `auto` gives each process a CUDA device of its own
-            where there is any, else the CPU.
+        device: Device to compute on. `auto` gives each process another CUDA device if
+            there is any, else the CPU.
 
     Raises:
-        BackendUnavailableError: If the device is not there, or there are fewer CUDA
+        BackendUnavailableError: If the device does not exist, or there are fewer CUDA
             devices than processes on this machine.
     """
     count = int(os.environ.get("WORLD_SIZE", "1"))
@@ -106,9 +106,9 @@ def _own_device(device: Device) -> torch.device:
     local_rank = int(os.environ.get("LOCAL_RANK", "0"))
     if local_rank >= torch.cuda.device_count():
         raise BackendUnavailableError(
-            f"{torch.cuda.device_count()} CUDA devices on this machine, but torchrun "
-            f"started a process number {local_rank} here; lower --nproc-per-node, or "
-            "train with --device cpu."
+            f"{torch.cuda.device_count()} CUDA devices on this machine are too few for "
+            f"process {local_rank} of torchrun (counted from 0); lower "
+            "--nproc-per-node, or train with --device cpu."
         )
     torch.cuda.set_device(local_rank)
     return torch.device("cuda", local_rank)

@@ -1,4 +1,4 @@
-"""The network that a training begins with: random, or that of a weights file."""
+"""The initial network of a training: random, or that of a weights file."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,7 +14,7 @@ from resdepth_colmap.training.config import Preset, TrainConfig
 from resdepth_colmap.training.widening import widened
 
 SHIPPED = Path("shipped")
-"""As the file to start from: the weights that come with the package."""
+"""As the file to start from: the weights of the package."""
 
 _MORE = (
     "valid",
@@ -25,7 +25,7 @@ _MORE = (
     "source_resampling",
     "shared_features",
 )
-"""What a network may have that the weights to start from have not, or have less of."""
+"""Options in which a network may exceed the weights that it starts from."""
 
 
 def chosen_network(
@@ -33,12 +33,12 @@ def chosen_network(
     options: Mapping[str, Any],
     preset: Preset = Preset.DEFAULT,
 ) -> NetworkConfig:
-    """The network that these options ask for.
+    """The configuration of the network to train.
 
     Args:
-        config: Its `init` may name weights, whose network it then is.
-        options: Attributes of `NetworkConfig` that were asked for.
-        preset: What holds for the others.
+        config: If its `init` names weights, the network is theirs.
+        options: Attributes of `NetworkConfig` that were given.
+        preset: Source of the others.
 
     Raises:
         WeightsError: If the weights to start from cannot be read.
@@ -62,17 +62,16 @@ def fresh_network(network_config: NetworkConfig, config: TrainConfig) -> ResDept
 
     Args:
         network_config: The network.
-        config: Its seed makes random weights, its `init` names others.
+        config: Its seed draws random weights; its `init` names others.
 
     Returns:
         The network, on the CPU.
 
     Raises:
         WeightsError: If the weights to start from cannot be read.
-        ConfigError: If they are of another network, or there is no propagation that
-            could be trained alone, or no first round before others. One that sees
-            less will do: it begins as blind to the new inputs as it was; so will one
-            with a narrower propagation, or none.
+        ConfigError: If they are of another network, there is no propagation that could
+            be trained alone, or later outer iterations lack initial weights. Weights of
+            a network with fewer inputs or a narrower propagation, or none, are widened.
     """
     torch.manual_seed(config.seed)
     network = ResDepthNet(network_config)
@@ -80,9 +79,9 @@ def fresh_network(network_config: NetworkConfig, config: TrainConfig) -> ResDept
         config.init is None or not network_config.source_depth
     ):
         raise ConfigError(
-            f"rounds={config.outer_iterations}: no network could do the first outer "
-            "iteration, or none sees its maps; add init and source_depth, or leave it "
-            "out."
+            f"rounds={config.outer_iterations}: later outer iterations need weights "
+            "for the first one and a network that sees its maps; add init and "
+            "source_depth, or leave rounds out."
         )
     if config.freeze_unet and network.propagation is None:
         raise ConfigError(
@@ -101,7 +100,7 @@ def fresh_network(network_config: NetworkConfig, config: TrainConfig) -> ResDept
 
 
 def init_path(init: Path) -> Path:
-    """The file that an `init` names."""
+    """The weights file that an `init` names."""
     return default_weights_path() if init == SHIPPED else init
 
 

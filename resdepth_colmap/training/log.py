@@ -3,7 +3,6 @@
 import csv
 import importlib.util
 import io
-import logging
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -32,20 +31,17 @@ COLUMNS = (
 Row = dict[str, float]
 """Values by column; what was not measured is left out."""
 
-logger = logging.getLogger(__name__)
-
 
 class TrainingLog:
-    """Lines of a log; each is on disk as soon as it is added."""
+    """Lines of a log; each is on disk as soon as it is added.
 
-    def __init__(self, folder: Path, step: int, with_tensorboard: bool) -> None:
-        """Go on with the log in a folder, or begin one.
+    Args:
+        folder: Folder of the files; an existing log is continued.
+        step: Step from which the training resumes: later lines are dropped.
+        with_tensorboard: Write for TensorBoard too, if it is installed.
+    """
 
-        Args:
-            folder: Where the files are.
-            step: Where the training goes on: later lines are of steps that were lost.
-            with_tensorboard: Write for TensorBoard too, if it is installed.
-        """
+    def __init__(self, folder: Path, step: int, with_tensorboard: bool) -> None:  # noqa: D107
         self.path = folder / CSV_NAME
         self.rows = [row for row in _read(self.path) if row["step"] <= step]
         self._board: SummaryWriter | None = None
@@ -62,13 +58,14 @@ class TrainingLog:
         Raises:
             WorkspaceError: If the file cannot be written.
         """
-        known = {key: value for key, value in row.items() if not math.isnan(value)}
+        known = _known(row)
         self.rows.append(known)
         text = io.StringIO()
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(COLUMNS)
+        writer = csv.DictWriter(text, COLUMNS, lineterminator="\n")
+        writer.writeheader()
         for line in self.rows:
-            writer.writerow([_shown(name, line.get(name)) for name in COLUMNS])
+            shown = {name: f"{value:.6g}" for name, value in line.items()}
+            writer.writerow({**shown, "step": int(line["step"])})
         write_whole(self.path, text.getvalue().encode())
         if self._board is not None:
             for name, value in known.items():
@@ -88,25 +85,23 @@ class TrainingLog:
 
 
 def _read(path: Path) -> list[Row]:
+    """The lines of a log; what is no number is left out."""
     if not path.is_file():
         return []
     with path.open(newline="", encoding="utf-8") as file:
-        lines = list(csv.DictReader(file))
-    rows = [
-        {name: float(text) for name, text in line.items() if name and _is_number(text)}
-        for line in lines
-    ]
-    return [row for row in rows if "step" in row]
+        rows = [
+            {name: _number(line.get(name)) for name in COLUMNS}
+            for line in csv.DictReader(file)
+        ]
+    return [row for row in map(_known, rows) if "step" in row]
 
 
-def _is_number(text: str | None) -> bool:
+def _known(row: Mapping[str, float]) -> Row:
+    return {name: value for name, value in row.items() if not math.isnan(value)}
+
+
+def _number(text: str | None) -> float:
     try:
-        return text is not None and not math.isnan(float(text))
+        return float(text or "nan")
     except ValueError:
-        return False
-
-
-def _shown(name: str, value: float | None) -> str:
-    if value is None:
-        return ""
-    return str(int(value)) if name == "step" else f"{value:.6g}"
+        return math.nan

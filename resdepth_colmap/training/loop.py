@@ -1,4 +1,4 @@
-"""The training loop: seeded, resumable, stopped by a loss that is not a number."""
+"""The training loop: seeded, resumable, stopped by a loss that is not finite."""
 
 import logging
 import math
@@ -12,25 +12,18 @@ from resdepth_colmap.errors import TrainingError
 from resdepth_colmap.io.images import write_png
 from resdepth_colmap.network.network_config import NetworkConfig
 from resdepth_colmap.progress import Advance, Progress, SilentProgress
-from resdepth_colmap.training.checkpoint import (
-    BEST_NAME,
-    STATE_NAME,
-    WEIGHTS_NAME,
-    load_state,
-    save_best,
-    save_state,
-)
+from resdepth_colmap.training import checkpoint
 from resdepth_colmap.training.config import TrainConfig
 from resdepth_colmap.training.curves import draw_curves
 from resdepth_colmap.training.data.batches import Batch
-from resdepth_colmap.training.data.sets import Data, Places, prepare_data
+from resdepth_colmap.training.data.sets import Data, Folders, prepare_data
 from resdepth_colmap.training.distributed import join_ranks
 from resdepth_colmap.training.initialisation import fresh_network
 from resdepth_colmap.training.log import Row, TrainingLog
 from resdepth_colmap.training.optimizer import Optimisation
 from resdepth_colmap.training.stop_request import StopRequest, stop_request
 from resdepth_colmap.training.validation import mean_loss
-from resdepth_colmap.viz.strips import BeforeAfter, depth_strip
+from resdepth_colmap.viz.strips import depth_strip
 
 logger = logging.getLogger(__name__)
 
@@ -46,7 +39,7 @@ def train(
     progress: Progress | None = None,
     validate_on: Sequence[Path] = (),
 ) -> Path:
-    """Train a network on workspaces with ground truth, or go on where it stopped.
+    """Train a network on workspaces with ground truth, or resume a stopped training.
 
     Under torchrun each process takes its part of each batch; the first one logs,
     validates and saves.
@@ -56,16 +49,16 @@ def train(
             without depth maps are matched first.
         output: Folder of the samples, the state, the weights, the log and its pictures.
         network_config: The network to train.
-        config: How.
-        progress: Is told of each step.
-        validate_on: More workspaces with `ground_truth/`, never trained on. Where
-            there are any, they say which weights are best, else held-out scenes do.
+        config: Options of the training.
+        progress: Advances with each step.
+        validate_on: More workspaces with `ground_truth/`, never trained on. If there
+            are any, the best weights are the best on these, else on held-out scenes.
 
     Returns:
-        Path of the best weights; of the last ones if nothing was validated.
+        Path of the best weights; of the last ones without validation.
 
     Raises:
-        TrainingError: Without samples, when the loss is not a number, or if the output
+        TrainingError: Without samples, when the loss is not finite, or if the output
             folder holds a training with other options.
         WorkspaceError: If a workspace is broken.
         WeightsError: If the weights to start from cannot be read.
@@ -77,17 +70,17 @@ def train(
             progress = SilentProgress()
         ranks.check_batch(config.batch_size)
         network = fresh_network(network_config, config)
-        places = Places(workspaces, validate_on, output)
-        data = prepare_data(places, network_config, config, ranks, progress)
+        folders = Folders(workspaces, validate_on, output)
+        data = prepare_data(folders, network_config, config, ranks, progress)
         torch.backends.cudnn.deterministic = True  # resumable to the bit on GPUs too
-        run = Optimisation.start(network, config, ranks)
+        run = Optimisation(network, config, ranks)
         with (
             stop_request() as stop,
             progress.stage("Training", config.steps) as advance,
         ):
             _Loop(run, data, output, stop).run(advance)
-    best = output / BEST_NAME
-    return best if best.is_file() else output / WEIGHTS_NAME
+    best = output / checkpoint.BEST_NAME
+    return best if best.is_file() else output / checkpoint.WEIGHTS_NAME
 
 
 class _Loop:
@@ -101,12 +94,12 @@ class _Loop:
         self.data = data
         self.output = output
         self.stop = stop
-        self.position = load_state(output, optimisation)
+        self.position = checkpoint.load_state(output, optimisation)
         self._check_samples()
         self.log: TrainingLog | None = None
 
     def run(self, advance: Advance) -> None:
-        """Take the steps that are left."""
+        """Take the remaining steps."""
         advance(self.position.step)
         if self.position.step >= self.config.steps:
             return
@@ -124,8 +117,8 @@ class _Loop:
         key, before = self.data.training.key, self.position.samples_key
         if before and before != key and self.ranks.is_first:
             logger.warning(
-                "%s: the samples are not those of before, so that the steps from here "
-                "on are not those of a training without a stop.",
+                "%s: the samples have changed since the last step; the result differs "
+                "from that of an uninterrupted training.",
                 self.output,
             )
         self.position.samples_key = key
@@ -133,10 +126,10 @@ class _Loop:
     def _run(self, advance: Advance) -> None:
         start = time.perf_counter()
         if self.log is not None and self.config.init and not self.position.step:
-            self.log.add({"step": 0, **self._validate(self.log)})  # what to beat
+            self.log.add({"step": 0, **self._validate(self.log)})  # the score to beat
         steps = range(self.position.step, self.config.steps)
-        batches = self.data.training.batches(steps, self.ranks, self.config.loaders)
-        for batch in batches:
+        crops, num_workers = self.data.training, self.config.loaders
+        for batch in crops.batches(steps, self.ranks, num_workers):
             value, wants_stop = self._step(batch)
             self.position.step += 1
             self.position.loss_sum += value
@@ -147,7 +140,7 @@ class _Loop:
                 if self._report(self.log, now - start):
                     start = time.perf_counter()
                 if wants_stop or self._is_due(self.config.checkpoint_steps):
-                    save_state(self.output, self.optimisation, self.position)
+                    checkpoint.save_state(self.output, self.optimisation, self.position)
             if wants_stop:
                 raise KeyboardInterrupt
             if self._is_due(self.config.validation_steps):
@@ -157,11 +150,11 @@ class _Loop:
         try:
             return self.optimisation.step(batch, self.stop.is_made)
         except TrainingError as error:
-            state = self.output / STATE_NAME
+            state = self.output / checkpoint.STATE_NAME
             kept = f"{state} is the last good state" if state.exists() else "not saved"
             raise TrainingError(
-                f"step {self.position.step}: {error}; {kept}. Look at these samples' "
-                "depth maps, or lower --learning-rate."
+                f"step {self.position.step}: {error}; {kept}. Check the depth maps of "
+                "these samples, or lower --learning-rate."
             ) from error
 
     def _is_due(self, every: int) -> bool:
@@ -169,7 +162,7 @@ class _Loop:
         return step % every == 0 or step == self.config.steps
 
     def _report(self, log: TrainingLog, seconds: float) -> bool:
-        """Write a line of the log where one is due, after validating where that is."""
+        """Add a line to the log if one is due, after validating if that is due."""
         validates = self._is_due(self.config.validation_steps) and (
             self.data.held_out is not None or bool(self.data.sets)
         )
@@ -189,7 +182,7 @@ class _Loop:
         return True
 
     def _validate(self, log: TrainingLog) -> Row:
-        """Refine views; keep the weights if none were better."""
+        """Refine views and draw some; save the weights if their score is the best."""
         network, step = self.optimisation.network, self.position.step
         row: Row = {}
         if self.data.held_out is not None:
@@ -199,16 +192,11 @@ class _Loop:
             scores, pictures = views.measure(network)
             row |= {f"{views.name}_{k}": v for k, v in scores._asdict().items()}
             score = scores.score
-            for place, picture in enumerate(pictures):
-                self._draw(log, f"{views.name}_{place}", picture, step)
+            for index, picture in enumerate(pictures):
+                name, strip = f"{views.name}_{index}", depth_strip(picture)
+                write_png(self.output / PREDICTIONS_FOLDER / f"{name}.png", strip)
+                log.add_picture(name, strip, step)
         if score < self.position.best_score:
             self.position.best_score = score
-            save_best(self.output, self.optimisation, step, row)
+            checkpoint.save_best(self.output, self.optimisation, step, row)
         return row
-
-    def _draw(
-        self, log: TrainingLog, name: str, picture: BeforeAfter, step: int
-    ) -> None:
-        strip = depth_strip(picture)
-        write_png(self.output / PREDICTIONS_FOLDER / f"{name}.png", strip)
-        log.add_picture(name, strip, step)

@@ -1,4 +1,4 @@
-"""What the training minimises."""
+"""The loss of the training."""
 
 from typing import NamedTuple
 
@@ -10,18 +10,17 @@ from resdepth_colmap.training.config import TrainConfig
 from resdepth_colmap.training.data.batches import Batch
 
 SMALL_ERROR = 0.02
-"""Errors below this share of a tile's spread are in the logarithm's steep part."""
+"""Error, over the spread of the tile, up to which the logarithmic term is steep."""
 
 LARGEST_ERROR = 8.0
-"""Beyond it an error says no more about the scale that the confidence should have."""
-
+"""Error, over the spread of the tile, beyond which the likelihood no longer grows."""
 
 DISTANCE_RATIOS = (0.25, 3.0)
-"""Range of the refined depth, over the tile's, that errors are weighed by."""
+"""Range of the refined depth, over the depth of the tile, that weights errors."""
 
 
 class LossSum(NamedTuple):
-    """A loss that can be added over processes; the loss is `total / num_known`.
+    """A loss to add up over processes; the loss is `total / num_known`.
 
     Attributes:
         total: Sum over the pixels whose truth is known, a scalar with gradient.
@@ -35,19 +34,19 @@ class LossSum(NamedTuple):
 def refinement_loss(refined: Refinement, batch: Batch, config: TrainConfig) -> LossSum:
     """L1, a logarithmic term and the likelihood of the predicted scale.
 
-    L1 (paper, section "Network Training") leaves pixels alone that are nearly right:
-    its gradient there is noise among those of outliers. The logarithmic term rises
-    steeply near zero, so that pixels that were right stay right. The predicted scale is
-    that of a Laplace distribution; its gradient does not reach the depth.
+    L1 (paper, section "Network Training") has hardly any effect on pixels that are
+    nearly right: the gradients of outliers dominate. The logarithmic term rises steeply
+    near zero and keeps them right. The predicted scale is that of a Laplace
+    distribution; its gradient does not reach the depth.
 
-    Errors are weighed by the refined depth, not by the true one: a pixel that may be of
-    either of two surfaces then goes to the likelier, while weights that grow with the
-    truth would draw it to the farther (docs/adr/0015).
+    Errors are weighted by the refined depth, not by the true one: a pixel that can
+    belong to either of two surfaces then goes to the likelier, while weights that grow
+    with the true depth would draw it to the farther (docs/adr/0015).
 
     Args:
         refined: The network's output, normalised.
-        batch: Truth and weights, normalised alike.
-        config: Weights of the terms; of a term without weight nothing is computed.
+        batch: Ground truth and weights, normalised alike.
+        config: Weights of the terms; a term without weight is not computed.
     """
     known = batch.known.to(batch.target.dtype)
     truth = torch.where(batch.known, batch.target, 0.0)
@@ -65,7 +64,7 @@ def refinement_loss(refined: Refinement, batch: Batch, config: TrainConfig) -> L
 
 
 def _distance_weight(refined: Refinement, batch: Batch, power: float) -> Tensor:
-    """The refined depth over the tile's, to a power; no gradient goes through it."""
+    """The refined depth over that of the tile, to a power; without gradient."""
     near, far = DISTANCE_RATIOS
     inverse_depth = batch.scaling.restore(refined.inverse_depth.detach())
     inverse_ratio = inverse_depth / batch.scaling.offset

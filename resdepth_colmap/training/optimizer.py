@@ -1,6 +1,5 @@
-"""One optimiser step, and all that changes by it."""
+"""One optimiser step: loss, gradients, new weights."""
 
-import dataclasses
 import math
 
 import torch
@@ -23,75 +22,55 @@ from resdepth_colmap.training.synced_norm import sync_norms
 WARM_UP_SHARE = 0.05
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class Optimisation:
-    """A network in training.
+    """A network in training, on the device of this process.
 
-    Attributes:
-        network: The network itself, for validation and for the weights file.
-        model: What is called in a step: the network, or what joins it with those of the
-            other processes.
-        optimiser: Holds the moments of the gradients.
-        schedule: Of the learning rate, a value a step.
-        config: How to train.
+    Args:
+        network: The network.
+        config: Options of the training.
         ranks: The processes.
     """
 
-    network: ResDepthNet
-    model: nn.Module
-    optimiser: torch.optim.Optimizer
-    schedule: torch.optim.lr_scheduler.LRScheduler
-    config: TrainConfig
-    ranks: Ranks
-
-    @classmethod
-    def start(
-        cls, network: ResDepthNet, config: TrainConfig, ranks: Ranks
-    ) -> "Optimisation":
-        """A training before its first step, on the device of this process."""
-        network = network.to(ranks.device)
+    def __init__(  # noqa: D107
+        self, network: ResDepthNet, config: TrainConfig, ranks: Ranks
+    ) -> None:
+        self.config, self.ranks = config, ranks
+        self.network = network.to(ranks.device)
         _freeze(network, config)
-        model: nn.Module = network
+        self._model: nn.Module = network
         if ranks.count > 1:
             sync_norms(network)
-            model = DistributedDataParallel(network)
+            self._model = DistributedDataParallel(network)
         else:
-            network = network.to(memory_format=torch.channels_last)  # type: ignore[call-overload] # torch's stubs lack the keyword
+            network.to(memory_format=torch.channels_last)  # type: ignore[call-overload] # torch's stubs lack the keyword
         kinds = {Optimiser.ADAM: torch.optim.Adam, Optimiser.ADAMW: torch.optim.AdamW}
-        optimiser = kinds[config.optimiser](
+        self.optimiser = kinds[config.optimiser](
             [value for value in network.parameters() if value.requires_grad],
             lr=config.learning_rate,
             weight_decay=config.weight_decay,
         )
-        return cls(
-            network=network,
-            model=model,
-            optimiser=optimiser,
-            schedule=_schedule(optimiser, config),
-            config=config,
-            ranks=ranks,
-        )
+        self.schedule = _schedule(self.optimiser, config)
 
     @property
     def learning_rate(self) -> float:
-        """That of the next step."""
+        """Learning rate of the next step."""
         return float(self.optimiser.param_groups[0]["lr"])
 
     def step(self, batch: Batch, wants_stop: bool = False) -> tuple[float, bool]:
         """Take a step.
 
         Args:
-            batch: The part of this process.
-            wants_stop: Whether this process was asked to stop.
+            batch: The part of the batch of this process.
+            wants_stop: Whether this process is to stop.
 
         Returns:
-            The loss over the whole batch; and whether any process was asked to stop.
+            The loss over the batch of all processes; and whether any is to stop.
 
         Raises:
-            TrainingError: If loss or gradients are not finite; nothing has changed but
-                the running statistics of the norms.
+            TrainingError: If loss or gradients are not finite. Only the running
+                statistics of the norms have changed then.
         """
-        self.model.train()
+        self._model.train()
         _freeze(self.network, self.config)
         batch = batch.to(self.ranks.device)
         inputs = batch.inputs.contiguous(memory_format=torch.channels_last)
@@ -104,7 +83,7 @@ class Optimisation:
         value = total / max(num_known, 1.0)
         self._check_finite("loss", value, batch)
         self.optimiser.zero_grad(set_to_none=True)
-        # The processes' gradients are averaged: count makes a sum of it again.
+        # The gradients are averaged over the processes: times count, they are summed.
         mean = loss.total * (self.ranks.count / max(num_known, 1.0))
         mean.backward()  # type: ignore[no-untyped-call] # torch's own
         limit = self.config.largest_gradient or math.inf
@@ -115,10 +94,10 @@ class Optimisation:
         return value, num_stops > 0
 
     def _refined(self, inputs: Tensor, sample_source: SampleSource) -> Refinement:
-        """The network's output in single precision, whatever it computed with."""
+        """The network's output in single precision, whatever the precision inside."""
         halved = self.config.precision is Precision.BFLOAT16
         with torch.autocast(inputs.device.type, torch.bfloat16, enabled=halved):
-            inverse_depth, log_scale = self.model(inputs, sample_source)
+            inverse_depth, log_scale = self._model(inputs, sample_source)
         return Refinement(
             inverse_depth.float(), None if log_scale is None else log_scale.float()
         )
@@ -131,7 +110,7 @@ class Optimisation:
 
 
 def _freeze(network: ResDepthNet, config: TrainConfig) -> None:
-    """What is not to be trained gets no gradients, and keeps its running statistics."""
+    """Frozen parts get no gradients and keep their running statistics."""
     for module in network.modules():
         if config.freeze_norms and isinstance(module, nn.BatchNorm2d):
             module.eval()

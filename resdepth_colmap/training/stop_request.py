@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM, kept until a step is whole."""
+"""Ctrl-C and SIGTERM, deferred to the end of a step."""
 
 import contextlib
 import logging
@@ -13,30 +13,32 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 class StopRequest:
-    """Whether somebody asked to stop."""
+    """Whether a signal asks the training to stop.
 
-    def __init__(self) -> None:
-        """Nobody did yet."""
-        self.is_made = False
+    Attributes:
+        is_made: Whether it does.
+    """
+
+    is_made = False
 
     def receive(self, number: int, _frame: FrameType | None) -> None:
-        """Take the signal; a second one does not wait.
+        """Handle a signal.
 
         Raises:
-            KeyboardInterrupt: On the second signal.
+            KeyboardInterrupt: On the second one, which does not wait.
         """
         if self.is_made:
             raise KeyboardInterrupt
         self.is_made = True
         name = signal.Signals(number).name
-        logger.info("%s: saving after this step; once more to stop at once.", name)
+        logger.info("%s: saving after this step; repeat it to stop at once.", name)
 
 
 @contextlib.contextmanager
 def stop_request() -> Iterator[StopRequest]:
-    """Take SIGINT and SIGTERM for the time of the block.
+    """Handle SIGINT and SIGTERM within the block.
 
-    Outside the main thread Python takes no signals; the request is then never made.
+    Outside the main thread, where Python handles no signals, the request is never made.
     """
     request = StopRequest()
     if threading.current_thread() is not threading.main_thread():

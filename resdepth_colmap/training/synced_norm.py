@@ -1,7 +1,6 @@
-"""Batch norm over the batch of all processes.
+"""Batch norm over the batch of all processes, on CPUs too (torch's is for GPUs only).
 
-torch has one, for GPUs only. With it, several processes train as one would with their
-batches together.
+Several processes then train as one process with their batches together.
 """
 
 from typing import Any, cast
@@ -11,7 +10,7 @@ from torch import Tensor, distributed, nn
 
 
 class SyncedBatchNorm(nn.BatchNorm2d):
-    """As `nn.BatchNorm2d`, with mean and variance taken over all processes."""
+    """`nn.BatchNorm2d` with mean and variance over all processes."""
 
     def forward(self, values: Tensor) -> Tensor:
         """Normalise a batch, shape (B, C, H, W)."""
@@ -47,7 +46,7 @@ def sync_norms(network: nn.Module) -> None:
 
 
 class _Sum(torch.autograd.Function):
-    """The sum over all processes; each one's gradient is the sum of all gradients."""
+    """The sum over all processes; the gradient is the sum over all processes too."""
 
     @staticmethod
     def forward(_context: Any, values: Tensor) -> Tensor:

@@ -1,8 +1,8 @@
-"""How good the network is on views that it is not trained on."""
+"""Validation: errors of the network on views that it is not trained on."""
 
 import dataclasses
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -26,20 +26,20 @@ from resdepth_colmap.viz.strips import BeforeAfter
 NUM_BATCHES = 8
 NUM_PICTURES = 2
 
-# The network by itself: no rule after it hides what it does to good pixels.
+# The network alone: update gating would hide its effect on good pixels.
 _REFINING = RefineConfig(inner_iterations=1, update_gating=False)
 _OFF = 0.02
 
 
 class Scores(NamedTuple):
-    """Errors of refined depth over those of the initial one: means over the views.
+    """Errors of the refined depth over those of the initial depth, means over views.
 
-    Only pixels with both an initial and a true depth count.
+    Only pixels with both initial and true depth count.
 
     Attributes:
-        mae_ratio: Of the mean absolute error.
-        medae_ratio: Of the median absolute error.
-        off_ratio: Of the share of pixels that are off by more than 2 %.
+        mae_ratio: Ratio of the mean absolute errors.
+        medae_ratio: Ratio of the median absolute errors.
+        off_ratio: Ratio of the shares of pixels that are off by more than 2 %.
     """
 
     mae_ratio: float
@@ -48,16 +48,16 @@ class Scores(NamedTuple):
 
     @property
     def score(self) -> float:
-        """What the best weights have least of: outliers and harm in equal parts.
+        """Mean of MAE ratio and MedAE ratio; the best weights have the least.
 
-        A ratio that is not known (there was no error before) is left out.
+        An unknown ratio (no error before) is left out.
         """
         return _mean([self.mae_ratio, self.medae_ratio])
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class ValidationSet:
-    """Views to refine again and again.
+    """Views to refine in each validation.
 
     Attributes:
         name: "held_out" or "watched".
@@ -69,48 +69,40 @@ class ValidationSet:
 
     @classmethod
     def of(cls, name: str, scenes: Sequence[Path], most: int) -> "ValidationSet":
-        """At most so many views, spread evenly over the scenes.
+        """At most `most` views, spread evenly over the scenes.
 
         Raises:
             WorkspaceError: If a workspace is broken, or cannot be matched.
         """
         views = [view for path in scenes for view in labelled_views(path)]
-        places = np.linspace(0, len(views) - 1, min(most, len(views)))
-        chosen = tuple(views[place] for place in places.round().astype(int))
-        return cls(name=name, views=chosen)
+        indices = np.linspace(0, len(views) - 1, min(most, len(views))).round()
+        return cls(name=name, views=tuple(views[int(index)] for index in indices))
 
     def measure(self, network: ResDepthNet) -> tuple[Scores, list[BeforeAfter]]:
-        """Refine the views; their scores, and some of them to look at."""
+        """Refine the views; returns their scores, and some of the views to look at."""
         ratios: list[list[float]] = []
         pictures: list[BeforeAfter] = []
-        for view, initial, refined, truth in self._refined(network):
+        for view, loaded in load_views(self.views, network.config.num_sources):
+            initial, truth = loaded.inputs.depth, loaded.truth
+            refined = refine_view(loaded.inputs, network, _REFINING).depth
             known = (truth > 0) & (initial > 0)
             ratios.append(_ratios(initial[known], refined[known], truth[known]))
             if len(pictures) < NUM_PICTURES:
-                rgb = read_rgb(view.workspace.image_path(view.image_name))
-                pictures.append(
-                    BeforeAfter(
-                        name=view.name,
-                        rgb=rgb,
-                        before=initial,
-                        after=refined,
-                        truth=truth,
-                    )
+                picture = BeforeAfter(
+                    name=view.name,
+                    rgb=read_rgb(view.workspace.image_path(view.image_name)),
+                    before=initial,
+                    after=refined,
+                    truth=truth,
                 )
-        means = [_mean([values[place] for values in ratios]) for place in range(3)]
-        return Scores(*means), pictures
-
-    def _refined(
-        self, network: ResDepthNet
-    ) -> Iterator[tuple[LabelledView, DepthMap, DepthMap, DepthMap]]:
-        for view, loaded in load_views(self.views, network.config.num_sources):
-            refined = refine_view(loaded.inputs, network, _REFINING).depth
-            yield view, loaded.inputs.depth, refined, loaded.truth
+                pictures.append(picture)
+        columns = np.reshape(ratios, (-1, len(Scores._fields))).T
+        return Scores(*map(_mean, columns.tolist())), pictures
 
 
 @torch.inference_mode()
 def mean_loss(network: ResDepthNet, crops: CropSet) -> float:
-    """The loss over the same few batches each time."""
+    """The loss over a few batches, the same each time."""
     network.eval()
     device = next(network.parameters()).device
     total, num_known = 0.0, 0.0
@@ -124,22 +116,18 @@ def mean_loss(network: ResDepthNet, crops: CropSet) -> float:
 
 
 def _ratios(initial: DepthMap, refined: DepthMap, truth: DepthMap) -> list[float]:
-    before, after = np.abs(initial - truth), np.abs(refined - truth)
+    """The ratios of one view, as in `Scores`; NaN where there was no error before."""
+    after, before = (
+        [np.mean(error), np.median(error), np.mean(error > _OFF * truth)]
+        for error in (np.abs(refined - truth), np.abs(initial - truth))
+    )
     return [
-        _ratio(float(after.mean()), float(before.mean())),
-        _ratio(float(np.median(after)), float(np.median(before))),
-        _ratio(
-            float((after > _OFF * truth).mean()), float((before > _OFF * truth).mean())
-        ),
+        float(new) / float(old) if old else math.nan
+        for new, old in zip(after, before, strict=True)
     ]
 
 
-def _ratio(after: float, before: float) -> float:
-    """NaN where there was no error: no ratio says how much worse it got."""
-    return after / before if before else math.nan
-
-
 def _mean(values: Sequence[float]) -> float:
-    """The mean of those that are known; NaN if none is."""
-    there = [value for value in values if math.isfinite(value)]
-    return sum(there) / len(there) if there else math.nan
+    """The mean of the finite values; NaN if there are none."""
+    finite = [value for value in values if math.isfinite(value)]
+    return sum(finite) / len(finite) if finite else math.nan

@@ -1,7 +1,7 @@
-"""Weights of a network for a larger one, which then does the same at first.
+"""Weights of a network as initialisation of a larger one with the same output.
 
-As in Net2Net (Chen et al., ICLR 2016), but what is new in the larger network starts
-with random weights, and what was there does not see it yet.
+As in Net2Net (Chen et al., ICLR 2016), but new parts of the larger network start with
+random weights, and the existing parts have zero weights for them.
 """
 
 from collections.abc import Mapping
@@ -13,8 +13,8 @@ from resdepth_colmap.network.network_config import NetworkConfig
 from resdepth_colmap.network.propagation import NUM_MORE, PACKED_PX
 
 NEW_DEPTH_LOGIT = -2.0
-"""Of depths that a propagation could not mix before: nearly no weight beside the
-pixel's own, but enough of a gradient."""
+"""Logit of depths that a propagation could not mix before: almost no weight beside the
+pixel's own depth, but enough of a gradient."""
 
 _PROPAGATION = "propagation."
 _FIRST_KERNEL = "encoder.0.0.weight"
@@ -28,17 +28,17 @@ def widened(
     wanted: NetworkConfig,
     fresh: Mapping[str, Tensor],
 ) -> dict[str, Tensor]:
-    """The weights of a network of the wanted configuration.
+    """The weights of a larger network.
 
     Args:
-        weights: Of a network that sees less, has no propagation or a narrower one.
+        weights: Weights of a network with fewer inputs, a narrower propagation or none.
         known: Its configuration.
-        wanted: That of the larger network.
-        fresh: The random weights of such a network.
+        wanted: Configuration of the larger network.
+        fresh: Random weights of the larger network.
 
     Returns:
-        All its weights: the output is that of the smaller network, within rounding and
-        the little that depths take which the smaller one could not mix.
+        All weights of the larger network. Its output is that of the smaller one, within
+        rounding and the small weight of depths that the smaller one could not mix.
     """
     grown = dict(weights)
     names = {
@@ -58,17 +58,17 @@ def widened(
 def _with_inputs(
     kernel: Tensor, known: tuple[str, ...], wanted: tuple[str, ...]
 ) -> Tensor:
-    """Zeros for new inputs; a name is one channel, or as many as each of the others."""
+    """A kernel with zeros for new inputs; names have equally many channels."""
     group = kernel.shape[1] // len(known)
     wide = kernel.new_zeros(kernel.shape[0], group * len(wanted), *kernel.shape[2:])
     for name, part in zip(known, torch.split(kernel, group, dim=1), strict=True):
-        place = wanted.index(name) * group
-        wide[:, place : place + group] = part
+        first = wanted.index(name) * group
+        wide[:, first : first + group] = part
     return wide
 
 
 def _with_channels(key: str, values: Tensor, fresh: Tensor) -> Tensor:
-    """New channels as they were made; no old one sees them."""
+    """New channels keep their random weights; existing ones have zeros for them."""
     wide = fresh.clone()
     if values.ndim > 1:
         is_transposed = key.startswith(f"{_PROPAGATION}up.")
@@ -79,7 +79,7 @@ def _with_channels(key: str, values: Tensor, fresh: Tensor) -> Tensor:
 
 
 def _with_depths(values: Tensor, fresh: Tensor) -> Tensor:
-    """The head for more channels, and for more depths to mix."""
+    """The head with more input channels, and with more depths to mix."""
     wide = torch.zeros_like(fresh)
     num_last = NUM_MORE * PACKED_PX**2
     num_known = len(values) - num_last

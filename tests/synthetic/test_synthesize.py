@@ -1,6 +1,7 @@
 """Laws of the rendered rooms: exact, repeatable, readable by COLMAP's library."""
 
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 import pycolmap
@@ -127,10 +128,12 @@ def test_finished_rooms_are_kept_and_unfinished_ones_made_anew(tmp_path: Path) -
     leftover = tmp_path / ".room_000005.partial"
     leftover.mkdir()
     (leftover / "half").touch()
-    told = []
-    paths = synthesize(tmp_path, config, lambda done, total: told.append((done, total)))
+    progress = mock.MagicMock()
+    paths = synthesize(tmp_path, config, progress)
     assert paths == [finished, tmp_path / "room_000005"]
-    assert told == [(1, 2), (2, 2)]
+    progress.stage.assert_called_once_with("Rendering", 2)
+    advance = progress.stage.return_value.__enter__.return_value
+    assert advance.call_args_list == [mock.call(1.0)] * 2
     assert list(finished.iterdir()) == []
     assert not leftover.exists()
     assert not (paths[1] / "half").exists()

@@ -59,7 +59,7 @@ class SignalAt:
 
 
 def step_of(output: Path) -> int:
-    return int(torch.load(output / "state.pt", weights_only=True)["step"])
+    return int(torch.load(output / "state.pt", weights_only=True)["position"]["step"])
 
 
 def test_a_signal_saves_the_step_it_came_in_and_the_rest_is_as_if_it_had_not(
@@ -150,18 +150,18 @@ def test_other_options_are_refused_by_name_and_harmless_ones_are_not(
     assert train([workspace], output, NETWORK, harmless).is_file()
 
 
-def test_other_samples_than_before_are_told(
+def test_a_change_of_the_samples_is_logged(
     workspace: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     output = tmp_path / "run"
     train([workspace], output, NETWORK, TRAINING)
     train([workspace], output, NETWORK, TRAINING)
-    assert "not those of before" not in caplog.text
+    assert "the samples have changed" not in caplog.text
     other = write_noisy_plane(tmp_path / "other")
     one_sided = dataclasses.replace(TRAINING, validation_share=0.0)
     train([workspace], tmp_path / "second", NETWORK, one_sided)
     train([workspace, other], tmp_path / "second", NETWORK, one_sided)
-    assert "not those of before" in caplog.text
+    assert "the samples have changed" in caplog.text
 
 
 def test_a_broken_state_names_itself(workspace: Path, tmp_path: Path) -> None:

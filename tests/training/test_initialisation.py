@@ -80,13 +80,13 @@ def test_new_inputs_change_nothing_at_first(tmp_path: Path) -> None:
     assert chosen == NETWORK
     wide = fresh_network(chosen, config).eval()
     stack = torch.randn(1, len(chosen.channels), 16, 16)
-    places = [chosen.channels.index(name) for name in blind.channels]
-    expected = load_weights(path)(stack[:, places])
+    indices = [chosen.channels.index(name) for name in blind.channels]
+    expected = load_weights(path)(stack[:, indices])
     torch.testing.assert_close(wide(stack), expected)
     wide.train()(stack).inverse_depth.sum().backward()
     gradient = wide.encoder[0][0].weight.grad  # type: ignore[index]
     assert isinstance(gradient, torch.Tensor)
-    assert all(gradient[:, place].any() for place in range(len(chosen.channels)))
+    assert all(gradient[:, index].any() for index in range(len(chosen.channels)))
 
 
 def test_a_propagation_is_added_to_weights_that_have_none(tmp_path: Path) -> None:
@@ -107,7 +107,7 @@ def test_a_propagation_is_added_to_weights_that_have_none(tmp_path: Path) -> Non
         chosen_network(kept, {"propagation_channels": 3})
 
 
-def test_a_wider_propagation_that_looks_again_begins_as_the_narrow_one(
+def test_a_wider_propagation_with_source_resampling_starts_as_the_narrow_one(
     tmp_path: Path,
 ) -> None:
     torch.manual_seed(5)
@@ -149,9 +149,9 @@ def test_an_input_that_the_weights_know_is_not_taken_away(weights: Path) -> None
         chosen_network(config, {"source_depth": False})
 
 
-def test_a_second_round_needs_a_network_that_did_the_first(weights: Path) -> None:
+def test_later_outer_iterations_need_weights_for_the_first(weights: Path) -> None:
     config = TrainConfig(outer_iterations=2)
-    with pytest.raises(ConfigError, match="no network could do"):
+    with pytest.raises(ConfigError, match="need weights for the first one"):
         fresh_network(NETWORK, config)
     config = TrainConfig(outer_iterations=2, init=weights)
     assert fresh_network(chosen_network(config, {}), config).config.source_depth

@@ -101,5 +101,5 @@ def test_what_a_training_starts_from_is_what_it_has_to_beat(tmp_path: Path) -> N
 
 def test_a_scene_to_train_on_and_to_watch_is_refused(tmp_path: Path) -> None:
     scenes = [write_noisy_plane(tmp_path / name) for name in ("a", "b")]
-    with pytest.raises(TrainingError, match="to be trained on and to be validated"):
+    with pytest.raises(TrainingError, match="both for training and for validation"):
         train(scenes, tmp_path / "run", NETWORK, TRAINING, validate_on=scenes[1:])

@@ -110,8 +110,8 @@ class OutputWorkspace:
         made.
         """
         for folder in ("depth_maps", "normal_maps", "confidence_maps"):
-            _make_folder(self.workspace.stereo_path / folder)
-        _make_folder(self.path)
+            make_folder(self.workspace.stereo_path / folder)
+        make_folder(self.path)
         if self.in_place:
             return
         for name in names:
@@ -202,7 +202,12 @@ def _no_record(path: Path, reason: str) -> WorkspaceError:
     )
 
 
-def _make_folder(path: Path) -> None:
+def make_folder(path: Path) -> None:
+    """Make a folder and those above it, if missing.
+
+    Raises:
+        WorkspaceError: If it cannot be made.
+    """
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:

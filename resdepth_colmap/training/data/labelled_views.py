@@ -1,6 +1,6 @@
-"""Views with an initial map and a true one: what there is to learn from, and to check.
+"""Views with an initial depth map and ground truth, to train on and to validate with.
 
-Each map of a view counts by itself: unfiltered and filtered ones have other mistakes.
+Each map of a view counts by itself: unfiltered and filtered maps have other errors.
 """
 
 import dataclasses
@@ -29,14 +29,14 @@ from resdepth_colmap.pipeline.refine.loop import IMAGE_CACHE_BYTES
 from resdepth_colmap.pipeline.refine.view import ViewInputs
 from resdepth_colmap.pipeline.stereo.stage import stereo_workspace
 from resdepth_colmap.pipeline.view_images import ViewImages
-from resdepth_colmap.progress import Progress, SilentProgress
+from resdepth_colmap.progress import Progress
 from resdepth_colmap.scene import DepthMap, Scene
 from resdepth_colmap.training.data.scenes import scene_name
 
 logger = logging.getLogger(__name__)
 
 LEAST_RIGHT_SHARE = 0.3
-"""A map with fewer pixels within 5 % of the truth is of a failed pair: not used."""
+"""Least share of known pixels within 5 % of the truth: below it, matching failed."""
 
 LEAST_FILLED_SHARE = 0.05
 
@@ -45,8 +45,8 @@ class Loaded(NamedTuple):
     """A labelled view in memory.
 
     Attributes:
-        inputs: What the refinement takes.
-        truth: True depth at the size of the map, shape (H, W); 0 = not known.
+        inputs: Inputs of the refinement.
+        truth: True depth at the size of the map, shape (H, W), in units; 0 = unknown.
     """
 
     inputs: ViewInputs
@@ -55,13 +55,13 @@ class Loaded(NamedTuple):
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class LabelledView:
-    """A map of a view whose true depth is known.
+    """A depth map of a view with ground truth.
 
     Attributes:
-        workspace: Where it lies.
+        workspace: Its workspace.
         scene: All views.
-        index: Its position in `scene.views`.
-        kind: The kind of its initial map, the word before ".bin".
+        index: Its index in `scene.views`.
+        kind: Kind of the initial map, the word before ".bin".
     """
 
     workspace: Workspace
@@ -76,7 +76,7 @@ class LabelledView:
 
     @property
     def name(self) -> str:
-        """Scene, image and kind of map, fit for a file's name."""
+        """Scene, image and kind of map, as a file name without suffix."""
         image = self.image_name.replace("/", "-")
         return f"{scene_name(self.workspace.path)}-{image}-{self.kind}"
 
@@ -92,7 +92,7 @@ class LabelledView:
 
     @functools.cached_property
     def other_map_paths(self) -> dict[int, Path]:
-        """The maps of its kind that are looked at, by the positions of their views."""
+        """The maps of its kind that it is compared with, by the index of their view."""
         paths = {}
         for choice in choose_sources(self.scene, self.index, NUM_SOURCE_MAPS):
             name = self.scene.views[choice.index].name
@@ -101,7 +101,7 @@ class LabelledView:
         return paths
 
     def load(self, num_sources: int, images: ViewImages | None = None) -> Loaded | None:
-        """Read the view; None if its map fails `_is_usable`.
+        """Read the view; None if its map is almost empty or mostly wrong.
 
         Args:
             num_sources: Number of sources.
@@ -146,45 +146,36 @@ def load_views(
 def labelled_views(
     path: Path, stereo: StereoConfig | None = None, progress: Progress | None = None
 ) -> list[LabelledView]:
-    """All maps of a workspace that can be compared with the truth.
+    """All depth maps of a workspace whose views have ground truth.
 
-    A workspace without any such map is matched first, as `resdepth-colmap stereo` does.
+    A workspace without any is matched first, as `resdepth-colmap stereo` does.
 
     Args:
         path: The workspace.
         stereo: Options of the matcher.
-        progress: Is told of the matching.
+        progress: Advances with the matching.
 
     Raises:
         WorkspaceError: If the workspace is broken, or cannot be matched.
     """
     workspace = open_workspace(path)
     scene = read_scene(workspace.sparse_path, workspace.images_path, workspace.path)
-    with_truth = [
-        index
-        for index, view in enumerate(scene.views)
-        if workspace.truth_path(view.name).is_file()
-    ]
-    views = _with_maps(workspace, scene, with_truth)
-    if with_truth and not views:
-        logger.info("%s has no depth maps: matching.", workspace.path)
-        stereo_workspace(
-            workspace,
-            scene,
-            stereo or StereoConfig(),
-            progress=progress or SilentProgress(),
-        )
-        views = _with_maps(workspace, scene, with_truth)
+    views = _with_maps(workspace, scene)
+    has_truth = any(workspace.truth_path(view.name).is_file() for view in scene.views)
+    if has_truth and not views:
+        logger.info("%s: no depth maps; matching.", workspace.path)
+        options = stereo or StereoConfig()
+        stereo_workspace(workspace, scene, options, progress=progress)
+        views = _with_maps(workspace, scene)
     return views
 
 
-def _with_maps(
-    workspace: Workspace, scene: Scene, indices: Sequence[int]
-) -> list[LabelledView]:
+def _with_maps(workspace: Workspace, scene: Scene) -> list[LabelledView]:
     return [
         LabelledView(workspace=workspace, scene=scene, index=index, kind=kind)
-        for index in indices
-        for kind in candidate_kinds(workspace, scene.views[index].name)
+        for index, view in enumerate(scene.views)
+        if workspace.truth_path(view.name).is_file()
+        for kind in candidate_kinds(workspace, view.name)
     ]
 
 

@@ -8,21 +8,13 @@ import numpy as np
 import pytest
 import torch
 from crop_sets import NETWORK, batch_of_step, crop_set
-from noisy_planes import write_noisy_plane
 
 from resdepth_colmap.network.network_config import InputVariant, NetworkConfig
 from resdepth_colmap.pipeline.refine.photometric_error import photometric_error
 from resdepth_colmap.training.data.crop_sampler import CropSampler, Draw
 from resdepth_colmap.training.data.crops import CropDataset
-from resdepth_colmap.training.data.samples import prepare_samples, read_sample
+from resdepth_colmap.training.data.samples import read_sample
 from resdepth_colmap.training.distributed import Ranks
-
-
-@pytest.fixture(scope="module")
-def samples(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, ...]:
-    folder = tmp_path_factory.mktemp("crops")
-    scene = write_noisy_plane(folder / "plane")
-    return tuple(prepare_samples([scene], NETWORK, folder / "cache"))
 
 
 def test_a_step_has_the_same_batch_whenever_it_is_asked_for(

@@ -16,13 +16,6 @@ from resdepth_colmap.training.data.samples import prepare_samples
 from resdepth_colmap.training.distributed import Ranks
 
 
-@pytest.fixture(scope="module")
-def samples(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, ...]:
-    folder = tmp_path_factory.mktemp("crops")
-    scene = write_noisy_plane(folder / "plane")
-    return tuple(prepare_samples([scene], NETWORK, folder / "cache"))
-
-
 def draws_of(
     samples: tuple[Path, ...],
     steps: range,

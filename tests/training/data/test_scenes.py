@@ -81,5 +81,5 @@ def test_a_folder_of_workspaces_stands_for_all_that_have_a_truth(
 def test_a_scene_that_is_trained_on_cannot_be_watched(tmp_path: Path) -> None:
     paths = [tmp_path / name for name in ("a", "b")]
     check_apart(paths[:1], paths[1:])
-    with pytest.raises(TrainingError, match="b: to be trained on"):
+    with pytest.raises(TrainingError, match="b: given both for training"):
         check_apart(paths, [tmp_path / "a" / ".." / "b"])

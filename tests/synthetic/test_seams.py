@@ -1,4 +1,4 @@
-"""Laws of the surfaces that repeat: none shows where it begins again."""
+"""Laws of the repeated textures: none shows a seam."""
 
 import numpy as np
 import pytest
