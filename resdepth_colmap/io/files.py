@@ -1,4 +1,4 @@
-"""Files that are whole or not there, links, and names that stay in their folder."""
+"""Atomic writing of files, links, and names that stay in their folder."""
 
 import contextlib
 import os
@@ -144,7 +144,7 @@ def _symlink_or_copy(source: Path, target: Path) -> None:
     try:
         target.symlink_to(source)
     except OSError:
-        shutil.copy2(source, target)  # keeps the time, which tells an unchanged copy
+        shutil.copy2(source, target)  # with the time: it marks unchanged copies
 
 
 def _flush_to_disk(path: Path) -> None:

@@ -19,7 +19,7 @@ from resdepth_colmap.io.files import write_whole
 from resdepth_colmap.io.png import encode_png
 from resdepth_colmap.scene import ColorImage, GrayImage, UnitColors
 
-# Rec. 709, the weights of COLMAP's own conversion to grey.
+# Rec. 709, the weights of COLMAP's conversion to grey.
 _LUMA = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
 
 
@@ -95,7 +95,7 @@ def _unit(values: npt.NDArray[Any], maximum: int) -> npt.NDArray[np.float32]:
 
 
 def _is_16_bit_color(image: Image.Image) -> bool:
-    # Pillow keeps 8 bits of each channel; its raw mode ("RGB;16B") tells of more.
+    # Pillow keeps 8 bits a channel; its raw mode ("RGB;16B") shows that there are 16.
     tiles = getattr(image, "tile", [])
     raw_modes = [tile[3] if isinstance(tile[3], str) else tile[3][0] for tile in tiles]
     return any(str(raw).startswith("RGB") and ";16" in str(raw) for raw in raw_modes)
@@ -112,7 +112,7 @@ def _read_16_bit_color(path: Path) -> npt.NDArray[np.float32]:
 
 @contextlib.contextmanager
 def open_image(path: Path) -> Iterator[Image.Image]:
-    """Open an image with Pillow; it is decoded when its pixels are asked for.
+    """Open an image with Pillow; it is decoded when its pixels are read.
 
     Raises:
         WorkspaceError: If the file is not there or no image, now or when it is decoded.
