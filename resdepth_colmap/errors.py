@@ -2,7 +2,7 @@
 
 
 class ResDepthError(Exception):
-    """Root of the package's own errors: one clear line, shown with exit code 1."""
+    """Root of the errors of the package: one clear line, shown with exit code 1."""
 
 
 class WorkspaceError(ResDepthError, OSError):
@@ -18,7 +18,7 @@ class WeightsError(ResDepthError, ValueError):
 
 
 class BackendUnavailableError(ResDepthError, RuntimeError):
-    """A device, a library or a program that was asked for is not on this machine."""
+    """A requested device, library or program is not on this machine."""
 
 
 class FusionError(ResDepthError, RuntimeError):

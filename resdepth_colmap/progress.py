@@ -1,4 +1,4 @@
-"""How a long computation says how far it is, without knowing who listens.
+"""Progress reports of long computations.
 
 The pipeline reports stages; the command line draws them.
 """
@@ -8,21 +8,21 @@ from contextlib import AbstractContextManager, nullcontext
 from typing import Protocol
 
 Advance = Callable[[float], None]
-"""Advances a stage by so many units (it is a step, not a position)."""
+"""Advances a stage by a number of units: a step, not a position."""
 
 
 class Progress(Protocol):
-    """A listener that is told about stages of known length."""
+    """A listener to stages of known length."""
 
     def stage(self, title: str, total: int) -> AbstractContextManager[Advance]:
         """Open a stage.
 
         Args:
-            title: What is being done, for the user to read ("Refining").
+            title: Name of the stage, for the user ("Refining").
             total: Number of units of the stage; fractions of one may be reported.
 
         Returns:
-            A context manager that is the stage; it yields what advances the stage.
+            A context manager for the stage; it yields the function that advances it.
             Leaving it ends the stage, whatever was reported.
         """
 
@@ -31,9 +31,9 @@ class SilentProgress:
     """A listener that ignores everything: for the library and for tests."""
 
     def stage(self, title: str, total: int) -> AbstractContextManager[Advance]:
-        """Open a stage that nobody watches; see `Progress.stage`."""
+        """Open a stage that is not shown; see `Progress.stage`."""
         return nullcontext(_ignore)
 
 
 def _ignore(units: float) -> None:
-    """Take the report and do nothing with it."""
+    """Ignore the report."""

@@ -117,7 +117,7 @@ def baseline(first: View, second: View) -> float:
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class Scene:
-    """The views of a workspace, and what its sparse points say of them.
+    """The views of a workspace, and the statistics of its sparse points.
 
     Without sparse points the three statistics are None (COLMAP cannot choose
     neighbours or depth ranges then either).

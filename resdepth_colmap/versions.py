@@ -1,4 +1,4 @@
-"""What a run ran on: versions, the machine, and the memory it took."""
+"""Versions, hardware and memory of a run."""
 
 import importlib.metadata
 import os
@@ -13,8 +13,8 @@ _INSTEAD = {"pycolmap": ("pycolmap-cuda12",), "open3d": ("open3d-cpu",)}
 def versions() -> dict[str, str]:
     """Version of Python and of each package that a result depends on.
 
-    A package that goes by another name on this machine is looked for under that, too;
-    "not installed" where it is not there.
+    Packages with variants of other names (`pycolmap-cuda12`) are found under these,
+    too; "not installed" where there is none.
     """
     found = {"python": platform.python_version()}
     for package in PACKAGES:
@@ -34,10 +34,10 @@ def hardware() -> str:
 
 
 def peak_memory_mb() -> float | None:
-    """Most memory that this process had at once, in MiB; None where unknown.
+    """Peak resident memory of this process, in MiB; None where unknown.
 
-    Linux's own count begins with the program; that of getrusage is inherited from the
-    process that started it.
+    Linux counts VmHWM from the start of the program; the value of getrusage is
+    inherited from the parent process.
     """
     status = Path("/proc/self/status")
     if status.exists():

@@ -1,8 +1,8 @@
-"""Depth of what one view sees and no other: the background goes on behind the edge.
+"""Completion of occluded pixels: the background continues behind a depth edge.
 
-Forward-backward check and background interpolation are those of semi-global matching
-(Hirschmueller, PAMI 2008, section 2.6): a pixel that the second view does not see lies
-beside something nearer, on the surface that this thing hides.
+The background interpolation of semi-global matching (Hirschmueller, PAMI 2008, section
+2.6): a pixel that the source does not see lies beside a nearer surface, on the surface
+that the nearer one occludes in the source.
 """
 
 import cv2
@@ -12,29 +12,29 @@ import numpy.typing as npt
 from resdepth_colmap.scene import FloatMap
 
 SMOOTHED_PX = 5
-"""Window of the median over what was completed: rows are completed one by one."""
+"""Window of the median filter over completed pixels, as rows are completed alone."""
 
 
 def complete_from_background(
     inverse_depth: FloatMap, known: npt.NDArray[np.bool_], along_rows: bool
 ) -> FloatMap:
-    """Give unknown pixels the depth of the nearest known ones, the farther of two.
+    """Give each unknown pixel the farther of the nearest known depths on both sides.
 
     Args:
         inverse_depth: Shape (H, W), float32, in 1/unit.
-        known: Which pixels have a depth to be trusted, shape (H, W).
-        along_rows: Look for them to the left and right; else above and below. The way
+        known: Which pixels have a reliable depth, shape (H, W).
+        along_rows: Search to the left and right, else above and below; the direction
             of the epipolar lines is the right one.
 
     Returns:
-        Inverse depth, shape (H, W), float32: unchanged where known; where a line has
-        nothing known, the median of all that is, or the input if nothing is.
+        Inverse depth, shape (H, W), float32, unchanged where known; the median of all
+        known pixels in a line without any, and the input if no pixel is known.
     """
     if known.all() or not known.any():
         return inverse_depth
     if not along_rows:
-        turned = complete_from_background(inverse_depth.T, known.T, along_rows=True)
-        return np.ascontiguousarray(turned.T)
+        transposed = complete_from_background(inverse_depth.T, known.T, along_rows=True)
+        return np.ascontiguousarray(transposed.T)
     before = _nearest_known(inverse_depth, known)
     after = _nearest_known(inverse_depth[:, ::-1], known[:, ::-1])[:, ::-1]
     background = np.fmin(before, after)

@@ -1,4 +1,4 @@
-"""Between which depths to look for a surface."""
+"""The depth range of a view, in which stereo searches."""
 
 from collections.abc import Sequence
 
@@ -11,7 +11,7 @@ NEAREST_IN_BASELINES = 0.3
 FARTHEST_IN_BASELINES = 300.0
 NUM_DEPTHS = 61
 LEAST_SHARE = 0.5
-"""Of the reference's pixels, relative to the depth where most are seen."""
+"""Of the pixels of the reference, relative to the depth where most are seen."""
 
 LARGEST_ANGLE_DEG = 45.0
 LEAST_DISPARITY_PX = 1.0
@@ -20,23 +20,23 @@ LEAST_DISPARITY_PX = 1.0
 def depth_range(
     scene: Scene, reference_index: int, source_indices: Sequence[int]
 ) -> tuple[float, float]:
-    """Nearest and farthest depth that a view's surfaces may have.
+    """Nearest and farthest depth of the surfaces of a view.
 
     With sparse points it is COLMAP's range. Without, it follows from the poses: a depth
-    counts if a fair share of the reference's pixels, placed there, is seen by a source
-    at no more than 45 degrees; and, at the far end, if it differs from infinity by a
-    pixel of disparity.
+    is inside if a fair share of the pixels of the reference, placed there, is seen by a
+    source at no more than 45 degrees and, at the far end, if its disparity differs by a
+    pixel from that at infinity.
 
     Args:
         scene: The views and their statistics.
         reference_index: Position of the view in `scene.views`.
-        source_indices: Positions of the views that it is compared with.
+        source_indices: Positions of its sources.
 
     Returns:
         Near and far depth, in units, 0 < near < far.
 
     Raises:
-        ValueError: If there are neither sparse points nor sources at other places.
+        ValueError: If there are neither sparse points nor sources with a baseline.
     """
     if scene.depth_range is not None:
         near, far = (float(depth) for depth in scene.depth_range[reference_index])
@@ -54,7 +54,7 @@ def _range_by_pose(
     if not longest:
         raise ValueError(
             f"no depth range for {view.name}: no sparse points, and none of its "
-            f"{len(lengths)} sources stands elsewhere."
+            f"{len(lengths)} sources has a baseline."
         )
     shortest = min(length for length in lengths if length > 0)
     depths = np.geomspace(

@@ -1,8 +1,7 @@
-"""A second view's depth map, carried into the reference camera.
+"""The depth map of a source, reprojected into the reference camera.
 
-What the source measured, seen from the reference: where nothing arrives, the source
-does not see that surface (or found no depth there), so that no photograph of it can
-tell the reference's depth.
+Where no depth of the source arrives, the source does not see the surface (or has no
+depth there), and its image says nothing about the depth of the reference.
 """
 
 import itertools
@@ -13,7 +12,7 @@ from torch import Tensor
 from resdepth_colmap.geometry.warp import LEAST_DEPTH_RATIO, project_homogeneous
 
 REACH_PX = 0.25
-"""How far a point reaches beyond the pixel that it falls into."""
+"""How far a point extends beyond the pixel that it falls into."""
 
 
 def reproject_inverse_depth(
@@ -23,16 +22,16 @@ def reproject_inverse_depth(
     source_from_reference: Tensor,
     size_px: tuple[int, int],
 ) -> Tensor:
-    """Move each depth of the source to where the reference sees that point.
+    """Reproject a depth map into the reference, with a z-buffer.
 
     Each point covers a little more than a pixel, so that a surface stays closed where
-    the reference sees it up to 1.5 times larger; of several the nearest counts. Nothing
-    is interpolated: no depth lies between two surfaces.
+    the reference sees it up to 1.5 times larger; the nearest of several points wins.
+    Nothing is interpolated: no depth lies between two surfaces.
 
     Args:
         source_inverse_depth: Shape (B, 1, Hs, Ws), in 1/unit; 0 = no depth.
         source_K: K for index coordinates, shape (B, 3, 3), in pixels.
-        reference_K: The same of the reference, shape (B, 3, 3).
+        reference_K: K of the reference, likewise.
         source_from_reference: Pose, shape (B, 3, 4), translation in units.
         size_px: Height and width of the reference.
 
@@ -48,7 +47,7 @@ def reproject_inverse_depth(
     usable = (source_inverse_depth[:, 0] > 0) & (depth_ratio > LEAST_DEPTH_RATIO)
     ratio = torch.where(usable, depth_ratio, 1.0)
     inverse_depth = (source_inverse_depth[:, 0] / ratio).flatten(1)
-    # A border of one pixel takes what falls outside.
+    # A border of one pixel takes the points that fall outside.
     columns, rows = (
         [
             torch.round(xy + shift).clamp(-1, size).int() + 1
@@ -69,6 +68,6 @@ def reproject_inverse_depth(
 
 
 def _inverse(pose: Tensor) -> Tensor:
-    """The pose the other way round, shape (B, 3, 4)."""
+    """The inverse pose, shape (B, 3, 4)."""
     rotation = pose[..., :3].transpose(-1, -2)
     return torch.cat([rotation, -rotation @ pose[..., 3:]], dim=-1)

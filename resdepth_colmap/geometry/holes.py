@@ -1,8 +1,8 @@
-"""Holes of a depth map, filled from their surroundings.
+"""Hole filling of depth maps by pull-push.
 
-Pull-push: the map is halved again and again, each pixel the mean of the known ones
-below it, until no hole remains; on the way back the holes take the interpolated value
-of the coarser map. Linear in the number of pixels, smooth inside large holes.
+The map is halved repeatedly, each pixel the mean of the known ones below it, until no
+hole remains; on the way back the holes take the interpolated value of the coarser map.
+Linear in the number of pixels, smooth inside large holes.
 """
 
 import numpy as np
@@ -35,7 +35,7 @@ def fill_holes(depth: DepthMap) -> DepthMap:
     if valid.all():
         return np.asarray(depth, dtype=np.float32).copy()
     filled = _pull_push(inverse, valid.astype(np.float32))
-    # Rounding must not lead out of the range of what was measured.
+    # Rounding must not leave the range of the measured depths.
     filled = np.clip(filled, inverse[valid].min(), inverse.max())
     return np.where(valid, depth, invert_map(filled)).astype(np.float32)
 
@@ -65,7 +65,7 @@ def _sum_of_four(values: FloatMap) -> FloatMap:
 
 
 def _double(values: FloatMap, height_px: int, width_px: int) -> FloatMap:
-    """Twice the size, bilinear between pixel centres, cut to the size that is asked."""
+    """Twice the size, bilinear between pixel centres, cropped to the given size."""
     tall = _double_rows(values)[:height_px]
     return _double_rows(tall.T)[:width_px].T
 

@@ -17,11 +17,11 @@ RADIUS_PX = 3
 pixels by tens of degrees, and COLMAP's fusion refuses more than 10."""
 
 LEAST_PIXELS = 5
-"""A window with fewer tells no slope."""
+"""A window with fewer valid pixels has no slope."""
 
 CENTRE_BONUS = 16.0
-"""A shifted window must fit so many times better (squared): on a curved surface the
-centred one is unbiased, at a depth edge it is worse by far more."""
+"""A shifted window has to fit better by this factor (squared): on a curved surface the
+centred window is unbiased, at a depth edge it is worse by far more."""
 
 LEAST_DETERMINANT = 1e-3
 """Of the window's moments: below, its pixels lie on a line."""
@@ -32,9 +32,9 @@ FLATTEST_NZ = np.float32(-1e-3)
 def normals_from_depth(depth: DepthMap, K: Matrix) -> NormalMap:
     """Normals of planes fitted to windows of the inverse depth.
 
-    Of nine windows that contain the pixel (centred, shifted to the sides and corners)
-    the one counts whose plane fits its own pixels and this one best (Kuwahara's idea),
-    so that normals next to a depth edge are those of the pixel's own surface.
+    Of nine windows that contain the pixel (centred, and shifted to the sides and
+    corners) the one is used whose plane fits best to its pixels and to this one, as in
+    the Kuwahara filter, so that a normal next to a depth edge is that of its surface.
 
     Args:
         depth: Shape (H, W), float32, in units; 0 = no depth.
@@ -132,6 +132,6 @@ def _fit(inverse: FloatMap) -> _Planes:
 
 
 def _normalise(normals: NormalMap) -> None:
-    """To length 1, in place; the scale of the numbers does not matter."""
+    """Scale to unit length, in place; the scale of the input does not matter."""
     normals /= np.abs(normals).max(axis=-1, keepdims=True)
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)

@@ -1,8 +1,8 @@
-"""What two views see of the same space, from their poses alone.
+"""The overlap of two views, from their poses alone.
 
-A coarse grid of the reference's pixels is placed at several depths and projected into
-the source. That tells how much the views overlap at each depth, at which angle their
-rays meet there, and how far a pixel moves compared with one at infinity.
+A coarse grid of pixels of the reference is placed at several depths and projected into
+the source: how much the views overlap at each depth, at which angle their rays meet
+there, and the disparity compared with a point at infinity.
 """
 
 from typing import NamedTuple
@@ -18,7 +18,7 @@ GRID_SIDE = 9
 
 
 class Overlap(NamedTuple):
-    """How a source sees the reference's pixels, for D depths and P pixels.
+    """How a source sees the pixels of the reference, for D depths and P pixels.
 
     Attributes:
         inside: Whether the point falls into the source image, shape (D, P), bool.
@@ -33,11 +33,11 @@ class Overlap(NamedTuple):
 
 
 def overlap(reference: View, source: View, depths: npt.ArrayLike) -> Overlap:
-    """Project a grid of the reference's pixels into a source.
+    """Project a grid of pixels of the reference into a source.
 
     Args:
         reference: The view whose pixels are taken.
-        source: The view that looks at them.
+        source: The view that they are projected into.
         depths: Depths in the reference, shape (D,), in units, > 0.
 
     Returns:

@@ -1,4 +1,4 @@
-"""The half pixel: the only module that knows where a pixel's centre lies.
+"""The half pixel: the only module that knows where the centre of a pixel lies.
 
 COLMAP's K counts the centre of the upper left pixel as (0.5, 0.5). Arrays, and
 `grid_sample(align_corners=True)`, count it as (0, 0): "index" coordinates. All our

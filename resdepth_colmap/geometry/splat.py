@@ -1,4 +1,4 @@
-"""Measured points as a depth map: each falls into one pixel, the front ones count."""
+"""Measured points as a depth map, by a z-buffer."""
 
 from collections.abc import Iterable
 
@@ -8,21 +8,20 @@ from resdepth_colmap.geometry.projection import Indices, look_up, pixel_xy, proj
 from resdepth_colmap.scene import DepthMap, FloatMap, Matrix
 
 FRONT_LAYER = 1.02
-"""Points up to that factor behind the nearest one of their pixel are its surface."""
+"""Points up to this factor behind the nearest one of a pixel are of its surface."""
 
 
 def splat_depth(
     xyz_chunks: Iterable[Matrix], K: Matrix, height_px: int, width_px: int
 ) -> DepthMap:
-    """The depth that points give to the pixels they fall into (a z-buffer).
+    """The depth of each pixel from the points that fall into it.
 
-    A pixel may hold many points: those of the front surface count, and of these the one
-    nearest to the pixel's centre. Nothing is interpolated, so that no depth lies
-    between two surfaces.
+    Of the points of the front surface of a pixel the one nearest to its centre is
+    taken. Nothing is interpolated: no depth lies between two surfaces.
 
     Args:
-        xyz_chunks: Points in the camera frame, each of shape (N, 3), in units; what is
-            not finite or behind the camera is passed over.
+        xyz_chunks: Points in the camera frame, each of shape (N, 3), in units; points
+            that are not finite or behind the camera are skipped.
         K: K for index coordinates, shape (3, 3), in pixels.
         height_px: Height of the map.
         width_px: Width of the map.

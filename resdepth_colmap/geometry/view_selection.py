@@ -1,8 +1,8 @@
-"""Which views to compare a reference view with.
+"""Source selection: which views to compare a reference view with.
 
-As in COLMAP, shared sparse points and the angle at which the rays meet in them decide.
-Workspaces without sparse points are served from the poses: how much of the reference
-the other view sees, and at which angle, averaged over a range of depths.
+As in COLMAP, by the shared sparse points and their triangulation angle. Without sparse
+points, by the poses: how much of the reference the other view sees, and at which angle,
+averaged over a range of depths.
 """
 
 import dataclasses
@@ -16,16 +16,16 @@ from resdepth_colmap.geometry.overlap import overlap
 from resdepth_colmap.scene import Matrix, Scene, View, baseline
 
 GOOD_ANGLES_DEG = (2.0, 15.0)
-"""Below, depth is uncertain; above, the views look too different."""
+"""Below, depth is uncertain; above, the images differ too much."""
 
 LARGEST_ANGLE_DEG = 75.0
-"""Beyond, hardly any surface shows itself to both views."""
+"""Beyond, hardly any surface is visible in both views."""
 
 LEAST_BASELINE_RATIO = 1e-3
-"""Baseline over the scene's typical one below which two views stand at one place."""
+"""Baseline over the typical one of the scene below which two views are at one place."""
 
 LEAST_GAIN = 0.05
-"""Share of a view for which a good source is exchanged for a worse one."""
+"""Share of a view, seen in addition, for which a good source is exchanged."""
 
 DEPTHS_IN_BASELINES = np.geomspace(1.0, 100.0, 13)
 
@@ -36,8 +36,8 @@ class SourceChoice:
 
     Attributes:
         index: Position in `Scene.views`.
-        reason: Why it was chosen, for people.
-        score: How good it is by itself, > 0; compares with those of the same reference.
+        reason: Why it was chosen, as text.
+        score: How good it is by itself, > 0; comparable for one reference.
         num_shared_points: Sparse points that both views see; 0 without sparse points.
         angle_deg: 75th percentile of the triangulation angle at these points; without
             points, the angle between the optical axes.
@@ -67,10 +67,10 @@ def choose_sources(
         candidates: Positions to choose from; None = all other views.
 
     Returns:
-        Up to `num_sources` choices; none if no view stands elsewhere and overlaps.
+        Up to `num_sources` choices; none if no view overlaps from another place.
     """
     others = range(len(scene.views)) if candidates is None else candidates
-    apart = _standing_apart(scene, reference_index, others)
+    apart = _at_other_places(scene, reference_index, others)
     if _shares_points(scene, reference_index, apart):
         scored = [_by_points(scene, reference_index, index) for index in apart]
     else:
@@ -87,16 +87,16 @@ def spread_choices(
     choices: Sequence[SourceChoice],
     num_sources: int,
 ) -> tuple[SourceChoice, ...]:
-    """Those of many choices that are good and together see all of a view, best first.
+    """Good sources that together see all of a view, best first.
 
-    The best by themselves may all see the same part of a view, and leave the rest to
-    one or none. So they are exchanged for others, the best exchange first, while that
-    lets much more of the view be seen by two sources, at a sound angle.
+    The best sources by themselves may all see the same part of a view and leave the
+    rest to one or none. They are exchanged for others, the best exchange first, as long
+    as two sources then see much more of the view at a good angle (docs/adr/0019).
 
     Args:
         scene: The views and their statistics.
         reference_index: Position of the reference in `scene.views`.
-        choices: What `choose_sources` says.
+        choices: The result of `choose_sources`.
         num_sources: How many to take at most.
 
     Returns:
@@ -105,7 +105,7 @@ def spread_choices(
     taken = list(range(min(num_sources, len(choices))))
     others = list(range(len(taken), len(choices)))
     if not taken or not others:
-        return tuple(choices[place] for place in taken)
+        return tuple(choices[index] for index in taken)
     seen = _well_seen(scene, reference_index, [choice.index for choice in choices])
     while True:
         number = seen[taken].sum(axis=0)
@@ -113,7 +113,7 @@ def spread_choices(
             [_value(number - seen[old] + seen[others]) for old in reversed(taken)]
         )
         if values.max() - _value(number) <= LEAST_GAIN:
-            return tuple(choices[place] for place in taken)
+            return tuple(choices[index] for index in taken)
         last, first = np.unravel_index(np.argmax(values), values.shape)
         taken[-1 - last], others[first] = others[first], taken[-1 - last]
         taken.sort()
@@ -123,7 +123,7 @@ def spread_choices(
 def _well_seen(
     scene: Scene, reference: int, indices: Sequence[int]
 ) -> npt.NDArray[np.int64]:
-    """Whether views see parts of the reference at a sound angle, 0 or 1, (C, parts)."""
+    """Whether views see parts of the reference at a good angle, 0 or 1, (C, parts)."""
     depths = _likely_depths(scene, reference, indices)
     view = scene.views[reference]
     sightings = [overlap(view, scene.views[index], depths) for index in indices]
@@ -132,12 +132,12 @@ def _well_seen(
 
 
 def _value(number: npt.NDArray[np.int64]) -> npt.NDArray[np.float64]:
-    """How much is seen of what two sources might see of each part, in 0..1."""
+    """Mean share of two sources that see each part, in 0..1."""
     return np.asarray(np.minimum(number, 2).mean(axis=-1) / 2)
 
 
-def _standing_apart(scene: Scene, reference: int, others: Sequence[int]) -> list[int]:
-    """The others, without repetitions, that do not stand where the reference stands."""
+def _at_other_places(scene: Scene, reference: int, others: Sequence[int]) -> list[int]:
+    """The others, without repetitions, that have a baseline to the reference."""
     view = scene.views[reference]
     distances = {i: baseline(view, scene.views[i]) for i in others if i != reference}
     typical = float(np.median([baseline(view, other) for other in scene.views]))

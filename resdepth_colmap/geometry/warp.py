@@ -1,8 +1,8 @@
-"""A second view, warped into the reference camera with the reference's depth.
+"""Warping: a source image, sampled by the depth of the reference.
 
-Paper, section "Image Rectification": no reasoning about occlusions. A surface that the
-source does not see gets the texture of what hides it, a second time; such displaced
-copies tell the network more about the shape than empty pixels would.
+Paper, section "Image Rectification": occlusions are not handled. A surface that the
+source does not see gets the texture of its occluder a second time; such displaced
+copies carry more evidence for the network than empty pixels.
 """
 
 import torch
@@ -22,15 +22,15 @@ def warp_to_reference(
     source_K: Tensor,
     source_from_reference: Tensor,
 ) -> tuple[Tensor, Tensor]:
-    """Sample the source where the reference's surface projects into it.
+    """Sample the source where the surface of the reference projects into it.
 
     Differentiable with respect to the image and the inverse depth.
 
     Args:
-        source_image: Any channels of the source, shape (B, C, Hs, Ws), float.
+        source_image: Channels of the source, shape (B, C, Hs, Ws), float.
         inverse_depth: Of the reference, shape (B, 1, H, W), in 1/unit; 0 = no depth.
         reference_K: K for index coordinates, shape (B, 3, 3), in pixels.
-        source_K: The same of the source, shape (B, 3, 3).
+        source_K: K of the source, likewise.
         source_from_reference: Pose, shape (B, 3, 4), translation in units.
 
     Returns:
@@ -47,7 +47,7 @@ def warp_to_reference(
     xy = homogeneous[:, :2].movedim(1, -1) / z[..., None]
     inside = in_front & (inverse_depth[:, 0] > 0)
     inside &= inside_image(xy, width_px, height_px)
-    xy = torch.where(inside[..., None], xy, 0.0)  # grid_sample wants no 1e30
+    xy = torch.where(inside[..., None], xy, 0.0)  # grid_sample fails for 1e30
     warped = grid_sample(
         source_image,
         to_grid(xy, width_px, height_px),
@@ -73,7 +73,7 @@ def project_homogeneous(
     """
     dtype, device = inverse_depth.dtype, inverse_depth.device
     # The small matrices in double precision: 1e-7 of 5000 px is a visible error. On the
-    # CPU, because Apple's GPUs have no doubles.
+    # CPU, because Apple GPUs have no doubles.
     K_s = source_K.to("cpu", torch.float64)
     pose = source_from_reference.to("cpu", torch.float64)
     inverse_K_r = torch.linalg.inv(reference_K.to("cpu", torch.float64))

@@ -27,8 +27,8 @@ TRUTH = "ground_truth_depth/dslr_images"
 _MARKS = (UNDISTORTED, DISTORTED, "ground_truth_depth")
 
 NOT_EVALUATED = 2
-"""Bit of a mask: the scan does not show what the image shows, nothing may be said.
-Bit 1 (not used to align images) says nothing against the depth."""
+"""Bit of a mask: the scan does not show what the image shows, so the pixel is not
+evaluated. Bit 1 (not used to align images) does not concern the depth."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -217,7 +217,7 @@ def read_distorted_views(path: Path) -> dict[str, DistortedView]:
             raise WorkspaceError(f"{path}: the model names {key} more than once.")
         views[key] = DistortedView(
             name=image.name,
-            # A copy: the model owns the one it hands out, and is about to go.
+            # A copy, because the model owns its camera and is freed at the end.
             camera=copy.deepcopy(image.camera),
             cam_from_world=np.array(image.cam_from_world().matrix(), np.float64),
         )

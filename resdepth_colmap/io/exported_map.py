@@ -4,14 +4,14 @@ WorkspaceError if a file cannot be written.
 """
 
 import io
-import re
 from pathlib import Path
 
 import numpy as np
 from PIL import Image
 
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.io.files import reading, whole_file, write_whole
+from resdepth_colmap.io.files import whole_file, write_whole
+from resdepth_colmap.io.images import open_image
 from resdepth_colmap.scene import DepthMap, FloatMap
 
 MAX_PNG_VALUE = 65535
@@ -26,9 +26,8 @@ def write_npy(path: Path, depth: DepthMap) -> None:
 
 def write_pfm(path: Path, depth: DepthMap) -> None:
     """Write a depth map as PFM: grey, little-endian float32, bottom row first."""
-    height, width = depth.shape
-    header = f"Pf\n{width} {height}\n-1.0\n".encode("ascii")  # -: little-endian
-    write_whole(path, header + np.flipud(depth).astype("<f4").tobytes())
+    with whole_file(path) as partial:
+        Image.fromarray(depth.astype(np.float32)).save(partial, format="PPM")
 
 
 def write_png16(path: Path, depth: DepthMap, unit: float) -> None:
@@ -48,31 +47,27 @@ def write_png16(path: Path, depth: DepthMap, unit: float) -> None:
         Image.fromarray(values).save(partial, format="PNG")
 
 
-_HEADER = re.compile(rb"(P[fF])\s+(\d{1,9})\s+(\d{1,9})\s+(-?[0-9.eE+-]+)\s")
-_LONGEST_HEADER = 100
-
-
 def read_pfm(path: Path) -> FloatMap:
-    """Read a grey PFM file, shape (H, W), float32, the top row first.
+    """Read a grey PFM file, of either byte order.
+
+    The values are taken as stored: the size of the header's scale has no meaning, as in
+    Middlebury's own reader. (OpenCV divides by it: 1/255 in Middlebury's files.)
+
+    Returns:
+        Shape (H, W), float32, the top row first; infinite values are left as they are.
 
     Raises:
         WorkspaceError: If the file is not there, no grey PFM, or truncated.
     """
-    with reading(path):
-        data = path.read_bytes()
-    match = _HEADER.match(data[:_LONGEST_HEADER])
-    if match is None or match[1] != b"Pf":
-        raise WorkspaceError(
-            f"{path}: no grey PFM file; it begins with {data[:16]!r} but expected "
-            "'Pf', width, height and scale."
-        )
-    width, height = int(match[2]), int(match[3])
-    num_expected = match.end() + 4 * width * height
-    if len(data) != num_expected:
-        raise WorkspaceError(
-            f"{path}: the header says {width} x {height}, that is {num_expected} "
-            f"bytes, but the file has {len(data)}; it is truncated, copy it again."
-        )
-    order = "<f4" if float(match[4]) < 0 else ">f4"
-    values = np.frombuffer(data, dtype=order, offset=match.end())
-    return np.flipud(values.reshape(height, width)).astype(np.float32)
+    with open_image(path) as image:
+        if image.format != "PPM" or image.mode != "F":
+            raise WorkspaceError(f"{path}: not a grey PFM file ('Pf').")
+        width_px, height_px = image.size
+        num_present = path.stat().st_size
+        # Before anything is allocated: the header may claim terabytes.
+        if num_present < 4 * width_px * height_px:
+            raise WorkspaceError(
+                f"{path}: the header says {width_px} x {height_px}, but the file has "
+                f"{num_present} bytes; it is truncated, copy it again."
+            )
+        return np.array(image, np.float32)

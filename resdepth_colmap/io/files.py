@@ -1,4 +1,4 @@
-"""Files that are whole or not there, links, and names that stay in their folder."""
+"""Atomic writing of files, links, and names that stay in their folder."""
 
 import contextlib
 import os
@@ -37,10 +37,21 @@ def whole_file(path: Path) -> Iterator[Path]:
     """
     partial = path.parent / f".partial-{secrets.token_hex(8)}{path.suffix}"
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        yield partial
-        _flush_to_disk(partial)
-        partial.replace(path)
+        with writing(path):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            yield partial
+            _flush_to_disk(partial)
+            partial.replace(path)
+    finally:
+        with contextlib.suppress(OSError):
+            partial.unlink()
+
+
+@contextlib.contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Make an OSError in the block a WorkspaceError that names the file to write."""
+    try:
+        yield
     except WorkspaceError:
         raise
     except OSError as error:
@@ -49,14 +60,11 @@ def whole_file(path: Path) -> Iterator[Path]:
             f"{path}: cannot write ({reason}); "
             "check the permissions of its folder and the free space of the disk."
         ) from error
-    finally:
-        with contextlib.suppress(OSError):
-            partial.unlink()
 
 
 @contextlib.contextmanager
 def reading(path: Path) -> Iterator[None]:
-    """Make an OSError in the block a WorkspaceError that names the file."""
+    """Make an OSError in the block a WorkspaceError that names the file to read."""
     try:
         yield
     except WorkspaceError:
@@ -136,7 +144,7 @@ def _symlink_or_copy(source: Path, target: Path) -> None:
     try:
         target.symlink_to(source)
     except OSError:
-        shutil.copy2(source, target)  # keeps the time, which tells an unchanged copy
+        shutil.copy2(source, target)  # with the time: it marks unchanged copies
 
 
 def _flush_to_disk(path: Path) -> None:

@@ -19,7 +19,7 @@ from resdepth_colmap.io.files import write_whole
 from resdepth_colmap.io.png import encode_png
 from resdepth_colmap.scene import ColorImage, GrayImage, UnitColors
 
-# Rec. 709, the weights of COLMAP's own conversion to grey.
+# Rec. 709, the weights of COLMAP's conversion to grey.
 _LUMA = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
 
 
@@ -49,7 +49,7 @@ def has_alpha(path: Path) -> bool:
     Raises:
         WorkspaceError: If the file is not there or no image.
     """
-    with _open(path) as image:
+    with open_image(path) as image:
         return "A" in image.getbands() or "transparency" in image.info
 
 
@@ -59,13 +59,13 @@ def read_alpha(path: Path) -> npt.NDArray[np.uint8]:
     Raises:
         WorkspaceError: If the file is not there or no image.
     """
-    with _open(path) as image:
+    with open_image(path) as image:
         return np.asarray(image.convert("RGBA").getchannel("A"))
 
 
 def image_size(path: Path) -> tuple[int, int]:
     """Width and height of an image, in pixels; WorkspaceError if it is no image."""
-    with _open(path) as image:
+    with open_image(path) as image:
         return image.size
 
 
@@ -78,7 +78,7 @@ def write_png(path: Path, rgb: ColorImage) -> None:
 
 def _read_unit(path: Path) -> npt.NDArray[np.float32]:
     """Values in 0..1, shape (H, W) or (H, W, 3), float32."""
-    with _open(path) as image:
+    with open_image(path) as image:
         if _is_16_bit_color(image):
             return _read_16_bit_color(path)
         if image.mode.startswith("I"):  # 16-bit grey
@@ -95,7 +95,7 @@ def _unit(values: npt.NDArray[Any], maximum: int) -> npt.NDArray[np.float32]:
 
 
 def _is_16_bit_color(image: Image.Image) -> bool:
-    # Pillow keeps 8 bits of each channel; its raw mode ("RGB;16B") tells of more.
+    # Pillow keeps 8 bits a channel; its raw mode ("RGB;16B") shows that there are 16.
     tiles = getattr(image, "tile", [])
     raw_modes = [tile[3] if isinstance(tile[3], str) else tile[3][0] for tile in tiles]
     return any(str(raw).startswith("RGB") and ";16" in str(raw) for raw in raw_modes)
@@ -111,8 +111,12 @@ def _read_16_bit_color(path: Path) -> npt.NDArray[np.float32]:
 
 
 @contextlib.contextmanager
-def _open(path: Path) -> Iterator[Image.Image]:
-    """An image of Pillow's whose errors name the file."""
+def open_image(path: Path) -> Iterator[Image.Image]:
+    """Open an image with Pillow; it is decoded when its pixels are read.
+
+    Raises:
+        WorkspaceError: If the file is not there or no image, now or when it is decoded.
+    """
     try:
         with _without_pixel_limit(), Image.open(path) as image:
             yield image

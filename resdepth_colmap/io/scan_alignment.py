@@ -1,4 +1,4 @@
-"""MeshLab projects (.mlp) that say where laser scans stand, as ETH3D has them.
+"""MeshLab projects (.mlp) with the poses of laser scans, as in ETH3D.
 
 `scan_alignment.mlp` names each scan's PLY file, in the frame of its scanner, and the
 4 x 4 matrix that brings it into the world.
@@ -35,7 +35,7 @@ class AlignedScan:
 
 
 def read_scan_alignment(path: Path) -> tuple[AlignedScan, ...]:
-    """Read where the scans of a scene stand, at least one; they are not read.
+    """Read the poses of the scans of a scene, at least one; the scans are not read.
 
     Of several groups of meshes the first counts, as for ETH3D's own program.
 

@@ -1,4 +1,4 @@
-"""Where the network runs."""
+"""The device that the network runs on."""
 
 import torch
 
@@ -10,7 +10,7 @@ def resolve_device(device: Device) -> torch.device:
     """The device to use; `auto` takes CUDA, else Apple's MPS, else the CPU.
 
     Args:
-        device: What was asked for.
+        device: The requested device.
 
     Returns:
         A device that this machine has.

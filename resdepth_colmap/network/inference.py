@@ -1,4 +1,4 @@
-"""Networks that will not learn any more, and so may be faster."""
+"""Faster networks for inference."""
 
 import torch
 from torch import nn
@@ -8,16 +8,16 @@ from resdepth_colmap.network.unet import ResDepthNet
 
 
 def for_inference(network: ResDepthNet) -> ResDepthNet:
-    """Make a network faster that is only asked, not trained.
+    """Make a network faster that is no longer trained.
 
-    Each batch norm becomes part of the convolution before it, and kernels lie in memory
-    as the convolutions of processors want them.
+    Each batch norm is folded into the convolution before it, and the kernels lie in
+    memory as the convolutions of CPUs prefer.
 
     Args:
         network: In evaluation mode; it is changed.
 
     Returns:
-        The same network: its answers differ by rounding alone.
+        The same network; its outputs differ by rounding alone.
     """
     for module in network.modules():
         if isinstance(module, nn.Sequential):
@@ -26,8 +26,8 @@ def for_inference(network: ResDepthNet) -> ResDepthNet:
 
 
 def _fold_norm(block: nn.Sequential) -> None:
-    for place in range(len(block) - 1):
-        convolution, norm = block[place], block[place + 1]
+    for index in range(len(block) - 1):
+        convolution, norm = block[index], block[index + 1]
         if isinstance(convolution, nn.Conv2d) and isinstance(norm, nn.BatchNorm2d):
-            block[place] = fuse_conv_bn_eval(convolution, norm)
-            block[place + 1] = nn.Identity()
+            block[index] = fuse_conv_bn_eval(convolution, norm)
+            block[index + 1] = nn.Identity()

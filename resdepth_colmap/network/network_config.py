@@ -1,4 +1,4 @@
-"""What the network looks like, what it sees and what it says."""
+"""Configuration of the network: its size, its inputs and its outputs."""
 
 import dataclasses
 import enum
@@ -7,17 +7,19 @@ from typing import Self
 from resdepth_colmap.config import Config
 
 REPROJECTED_CHANGE, REPROJECTED = "reprojected_change", "reprojected"
-"""Channels of other views' depth maps in the reference: where they differ, and are."""
+"""Input channels of the depth maps of other views, reprojected into the reference: the
+difference to the initial map, and whether there is a depth."""
 
 RED, BLUE = "red", "blue"
-"""Channels of the reference in colour, besides its grey values."""
+"""Input channels of the reference in colour, besides its grey values."""
 
-
-_AGAIN = ("source_there", "source_near", "source_far", "nearest", "farthest")
+_RESAMPLED = ("source_there", "source_near", "source_far", "nearest", "farthest")
+"""Inputs of the propagation network from source resampling: the first source at the
+refined, the nearest and the farthest depth, and the last two of these depths."""
 
 
 class InputVariant(enum.StrEnum):
-    """What the network sees (paper, section "Network Variants")."""
+    """Inputs of the network (paper, section "Network Variants")."""
 
     STEREO = "stereo"
     MONO = "mono"
@@ -26,7 +28,7 @@ class InputVariant(enum.StrEnum):
 
 
 class Normalisation(enum.StrEnum):
-    """How a tile's inverse depth is scaled before the network sees it."""
+    """How the inverse depth of a tile is scaled before it enters the network."""
 
     BASELINE = "baseline"  # the paper's: times the baseline, minus the tile's mean
     ROBUST = "robust"  # minus the tile's median, over half its 10-90 % spread
@@ -40,22 +42,25 @@ class NetworkConfig(Config):
         levels: Down-sampling levels; 7 for tiles of 512 px, 5 for tiles of 128 px.
         base_channels: Channels of the first level; they double with each level.
         max_channels: Where the doubling stops.
-        variant: What the network sees.
-        num_sources: Warped second views (variants stereo and images-only).
-        valid: Give it the mask of pixels whose depth was real, not filled.
-        photo_consistency: Give it the local correlation of reference and warped view.
-        source_depth: Compare its input with the depth maps of other views, which
-            complete it, and give it where they differ and where nothing arrives.
-        color: Give it the reference in colour.
-        gate: Let it weigh its residual by a learned gate in 0..1.
-        last_block: One more convolution block at full resolution, before the last
-            convolution: lets it weigh fine structure by what surrounds it.
-        confidence: Let it predict the scale of its own error.
-        propagation_channels: Let a second, small network of so many channels mix each
-            pixel's depth from those around it (docs/adr/0015); 0 = none.
-        source_resampling: Show that one the first source warped by the refined depth,
-            by the nearest and by the farthest around it, and let it take these.
-        shared_features: Show that one what the U-Net's last convolution sees, too.
+        variant: Which of depth and images are inputs.
+        num_sources: Number of warped source images (variants stereo and images-only).
+        valid: Input: the mask of pixels whose depth is measured, not filled.
+        photo_consistency: Input: the local correlation of reference and warped source.
+        source_depth: Input: the difference to the depth maps of other views,
+            reprojected into the reference, and where they have a depth. They also fill
+            the holes of the initial map.
+        color: Input: the reference in colour.
+        gate: Output: a learned gate in 0..1 that scales the residual.
+        last_block: One more convolution block at full resolution before the last
+            convolution.
+        confidence: Output: the scale of the expected error.
+        propagation_channels: Channels of the propagation network, which mixes the depth
+            of each pixel from those around it (docs/adr/0015); 0 = no such network.
+        source_resampling: The propagation network sees the first source warped by the
+            refined depth and by the nearest and the farthest depth around each pixel,
+            and may take these depths (docs/adr/0016).
+        shared_features: The propagation network sees the features of the last
+            convolution of the U-Net.
         normalisation: How inverse depth is scaled.
     """
 
@@ -119,7 +124,7 @@ class NetworkConfig(Config):
 
     @property
     def uses_sources(self) -> bool:
-        """Whether warped second views are among the inputs."""
+        """Whether warped source images are among the inputs."""
         return self.variant in (InputVariant.STEREO, InputVariant.IMAGES_ONLY)
 
     @property
@@ -129,12 +134,12 @@ class NetworkConfig(Config):
 
     @property
     def propagates(self) -> bool:
-        """Whether a second network sharpens what the first one says."""
+        """Whether a propagation network follows the U-Net."""
         return self.propagation_channels > 0 and self.residual
 
     @property
     def resamples_source(self) -> bool:
-        """Whether the second network looks at the first source again."""
+        """Whether the propagation network resamples the first source."""
         return self.source_resampling and self.propagates and self.uses_sources
 
     @property
@@ -157,12 +162,12 @@ class NetworkConfig(Config):
 
     @property
     def propagation_inputs(self) -> tuple[str, ...]:
-        """Names of what the second network sees, in order."""
-        said = ["refined", "log_scale"] if self.confidence else ["refined"]
-        again = _AGAIN if self.resamples_source else ()
+        """Names of the inputs of the propagation network, in order."""
+        outputs = ["refined", "log_scale"] if self.confidence else ["refined"]
+        resampled = _RESAMPLED if self.resamples_source else ()
         num_features = self.base_channels if self.shared_features else 0
         features = (f"feature_{index}" for index in range(num_features))
-        return (*said, *self.channels, *again, *features)
+        return (*outputs, *self.channels, *resampled, *features)
 
     @property
     def multiple_px(self) -> int:

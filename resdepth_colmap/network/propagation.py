@@ -1,4 +1,4 @@
-"""Depth that each pixel takes over from its surroundings (docs/adr/0015)."""
+"""The propagation network: depths mixed from the surroundings (docs/adr/0015)."""
 
 import itertools
 import math
@@ -12,18 +12,18 @@ from torch.nn.functional import max_pool2d, pad, pixel_shuffle, pixel_unshuffle
 from resdepth_colmap.network.conv_block import conv_block
 
 STEPS_PX = (2, 5)
-"""How far away, along and across, the pixels are that one may take over from."""
+"""Offsets of the neighbouring pixels whose depth a pixel may take."""
 
 NUM_POOLS = 3
 NUM_MORE = 3  # a residual, its gate, and what to add to the logarithm of the error
-PACKED_PX = 2  # the first convolutions see squares of so many pixels as channels
+PACKED_PX = 2  # the convolutions see squares of 2 x 2 pixels as channels
 EXTREME_RADIUS_PX = 6  # a matcher's window of 11 x 11 makes things fatter by 5
-LARGEST_STEP = 16.0  # from one limit of what the networks see to the other
+LARGEST_STEP = 16.0  # from one input limit of the networks to the other
 OWN_DEPTH_LOGIT = 4.0  # three quarters of the weight
 
 
 class Propagated(NamedTuple):
-    """What the propagation says of each pixel.
+    """Outputs of the propagation network for each pixel.
 
     Attributes:
         inverse_depth: Normalised inverse depth, shape (B, 1, H, W).
@@ -36,19 +36,18 @@ class Propagated(NamedTuple):
 
 
 class Propagation(nn.Module):
-    """A small U-Net that mixes each pixel's depth from depths that are there.
+    """A small U-Net that mixes the depth of each pixel from candidate depths.
 
-    A network that regresses a depth draws a slope where one surface ends before
-    another; a mean of given depths, with weights for each pixel that may be nearly 0
-    and 1, draws a step (convolutional spatial propagation: Cheng et al., ECCV 2018;
-    here in one step, from fixed offsets, with weights from a softmax). The candidates
-    are the refined inverse depth of the pixel, that of the eight pixels around it at
-    each of `STEPS_PX`, the initial one, and others that the caller knows. A small gated
-    residual is added.
+    A network that regresses depth draws a slope across a depth edge; a weighted mean of
+    candidates, whose weights may be nearly 0 and 1, draws a step (convolutional spatial
+    propagation: Cheng et al., ECCV 2018; here in one step, from fixed offsets, with
+    weights from a softmax). The candidates are the refined inverse depth of the pixel,
+    that of the eight pixels around it at each of `STEPS_PX`, the initial one, and those
+    of the caller. A small gated residual is added.
 
-    It works at half the resolution, where each 2 x 2 square is one pixel of four times
-    the channels: as exact, and cheaper. A fresh one gives all pixels the same weights,
-    most of it to the pixel itself, and adds nothing.
+    It works at half the resolution, where each square of 2 x 2 pixels is one pixel of
+    four times the channels: as exact, and cheaper. With fresh weights all pixels have
+    the same weights, most of it on the pixel itself, and the residual is 0.
     """
 
     def __init__(
@@ -57,10 +56,10 @@ class Propagation(nn.Module):
         """Build it with fresh weights.
 
         Args:
-            num_inputs: Channels that it sees.
+            num_inputs: Number of input channels.
             channels: Channels of the first level; 8/3 of them at the last.
             levels: Height and width will be multiples of 2**levels.
-            num_more: Depths that the caller adds to those to mix.
+            num_more: Number of candidate depths that the caller adds.
         """
         super().__init__()
         widths = [channels * factor // 3 for factor in (3, 4, 6, 8)]
@@ -89,7 +88,7 @@ class Propagation(nn.Module):
 
     def forward(
         self,
-        seen: Tensor,
+        inputs: Tensor,
         refined: Tensor,
         initial: Tensor,
         more: Sequence[Tensor] = (),
@@ -97,17 +96,17 @@ class Propagation(nn.Module):
         """Mix the depths of a batch of tiles.
 
         Args:
-            seen: What decides, shape (B, C, H, W), float.
-            refined: Normalised inverse depth so far, shape (B, 1, H, W).
-            initial: The same before any refinement.
-            more: Further depths to mix, each of that shape.
+            inputs: Input channels, shape (B, C, H, W), float.
+            refined: Normalised inverse depth from the U-Net, shape (B, 1, H, W).
+            initial: The same before the refinement.
+            more: Further candidates, each of that shape.
         """
-        packed = pixel_unshuffle(seen, PACKED_PX)
+        packed = pixel_unshuffle(inputs, PACKED_PX)
         outputs = pixel_shuffle(self.head(self._features(packed)), PACKED_PX)
-        # Channel by channel from here on, as a processor's cache holds one of them.
+        # Channel by channel from here on: the cache of a CPU holds one of them.
         outputs = outputs.to(refined.dtype).contiguous()
         logits, last = torch.split(outputs, [self.num_candidates, NUM_MORE], dim=1)
-        # Unbound at once: the gradient of a slice is as large as all of them.
+        # Unbound at once: the gradient of a slice is as large as the whole tensor.
         _, *weights = torch.softmax(logits, dim=1)[:, :, None].unbind(dim=1)
         residual, gate, log_scale_change = last[:, :, None].unbind(dim=1)
         mixed = refined

@@ -11,11 +11,10 @@ from resdepth_colmap.network.network_config import NetworkConfig
 from resdepth_colmap.network.propagation import Propagation, extremes
 
 INPUT_LIMIT = 8.0
-"""The convolutions see the normalised inverse depth clamped to plus or minus this."""
+"""Limit of the normalised inverse depth that the convolutions see, both signs."""
 
 LOG_SCALE_LIMITS = (-8.0, 4.0)
-"""The propagation sees the logarithm of the expected error clamped to these."""
-
+"""Limits of the logarithm of the expected error that the propagation sees."""
 
 SampleSource = Callable[[Tensor], Tensor]
 """Grey values of the first source where normalised inverse depths, shape (B, C, H, W),
@@ -23,7 +22,7 @@ would project into it, of that shape."""
 
 
 class Refinement(NamedTuple):
-    """What the network says of each pixel.
+    """Outputs of the network for each pixel.
 
     Attributes:
         inverse_depth: Normalised inverse depth, shape (B, 1, H, W).
@@ -42,16 +41,16 @@ class ResDepthNet(nn.Module):
     convolution, batch norm, ReLU and 2x2 max pooling; one such convolution at the
     bottleneck; each decoder level is a 2x2 up-convolution that keeps its channels, the
     addition of the encoder's map of that size, and a 3x3 convolution to the channels of
-    the next level; a plain 3x3 convolution ends it, after one more block at full
-    resolution if `last_block` says so (the published code has none). Channels double
+    the next level; a plain 3x3 convolution ends it, with `last_block` after one more
+    block at full resolution (the published code has none). Channels double
     from `base_channels` up to `max_channels`. At 64 to 512 channels, 7 levels and three
     inputs it has 24.2 million parameters, and a tile of 512 x 512 reaches the
     bottleneck as 512 x 4 x 4.
 
     The last convolution starts at zero, so that a fresh network returns its input depth
-    exactly. PatchMatch's outliers are many times the spread of a tile: the convolutions
-    see channel 0 clamped to `INPUT_LIMIT`, the long residual adds it as it is. What
-    comes out is sharpened by a `Propagation`, if `propagation_channels` says so.
+    exactly. Outliers of PatchMatch are many times the spread of a tile: channel 0 is
+    clamped to `INPUT_LIMIT` for the convolutions, while the residual is added to it
+    unclamped. A `Propagation` follows unless `propagation_channels` is 0.
     """
 
     def __init__(self, config: NetworkConfig) -> None:
@@ -109,8 +108,8 @@ class ResDepthNet(nn.Module):
             stack: Inputs in the order of `config.channels`, shape (B, C, H, W), float;
                 channel 0 is the normalised inverse depth unless the variant is
                 images-only. H and W are multiples of 2**levels.
-            sample_source: Shows the first source at any depth; without it a network
-                with source resampling sees black.
+            sample_source: Samples the first source at given depths; without it a
+                network with source resampling gets zeros.
 
         Returns:
             The refined inverse depth and its expected error, both normalised.
@@ -139,21 +138,21 @@ class ResDepthNet(nn.Module):
     ) -> Refinement:
         if self.propagation is None:
             return before
-        seen = [before.inverse_depth.clamp(-INPUT_LIMIT, INPUT_LIMIT)]
+        inputs = [before.inverse_depth.clamp(-INPUT_LIMIT, INPUT_LIMIT)]
         if before.log_scale is not None:
-            seen.append(before.log_scale.clamp(*LOG_SCALE_LIMITS))
-        seen.append(self._squash(stack))
+            inputs.append(before.log_scale.clamp(*LOG_SCALE_LIMITS))
+        inputs.append(self._squash(stack))
         more: tuple[Tensor, ...] = ()
         if self.config.resamples_source:
             more = extremes(before.inverse_depth)
-            seen.append(
-                _seen_again(torch.cat([before.inverse_depth, *more], 1), sample_source)
+            inputs.append(
+                _resampled(torch.cat([before.inverse_depth, *more], 1), sample_source)
             )
-            seen += [depth.clamp(-INPUT_LIMIT, INPUT_LIMIT) for depth in more]
+            inputs += [depth.clamp(-INPUT_LIMIT, INPUT_LIMIT) for depth in more]
         if self.config.shared_features:
-            seen.append(features)
+            inputs.append(features)
         propagated = self.propagation(
-            torch.cat(seen, dim=1), before.inverse_depth, stack[:, :1], more
+            torch.cat(inputs, dim=1), before.inverse_depth, stack[:, :1], more
         )
         log_scale = before.log_scale
         if log_scale is not None:
@@ -196,8 +195,8 @@ class ResDepthNet(nn.Module):
             )
 
 
-def _seen_again(depths: Tensor, sample_source: SampleSource | None) -> Tensor:
-    """The source at these depths; no gradient goes through where it is looked at."""
+def _resampled(depths: Tensor, sample_source: SampleSource | None) -> Tensor:
+    """The first source at these depths; no gradient flows into the depths."""
     if sample_source is None:
         return torch.zeros_like(depths)
     return sample_source(depths.detach().float()).to(depths.dtype)

@@ -1,9 +1,9 @@
 """Weights files: safetensors that carry their network configuration in the header.
 
 Never a pickle: reading a weights file runs no code. Convolutions are stored in half
-precision, which changes depths by far less than a thousandth and halves the file; all
-vectors (biases, batch norm and its statistics) stay in single precision, as a running
-variance leaves the range of half precision easily.
+precision, which halves the file and changes depths by far less than a thousandth;
+vectors (biases, batch norm and its statistics) are stored in single precision, because
+a running variance easily leaves the range of half precision.
 """
 
 import hashlib
@@ -33,16 +33,16 @@ _OLDER = {
     "source_resampling": False,
     "shared_features": False,
 }
-"""Options that the headers of older files do not name, as those networks were."""
+"""Values of the options that the headers of older files lack."""
 
 _RENAMED = {"second_look": "source_resampling"}
-"""Options by the names that the headers of older files know them by."""
+"""New names of options, by their names in the headers of older files."""
 
 WAY_OUT = "use a file that `resdepth-colmap train` wrote, or leave out --weights"
 
 
 def default_weights_path() -> Path:
-    """Where the weights lie that come with the package."""
+    """Path of the weights that come with the package."""
     package = importlib.resources.files("resdepth_colmap")
     return Path(str(package / "weights" / "resdepth.safetensors"))
 
@@ -55,7 +55,7 @@ def save_weights(
     Args:
         path: File to write; replaced if it is there.
         network: The network, on any device.
-        facts: What else is worth knowing (data, steps, scores), fit for JSON.
+        facts: How it was trained (data, steps, scores), fit for JSON.
 
     Raises:
         WeightsError: If a weight is not a finite number in the file's precision.
@@ -93,7 +93,7 @@ def load_weights(
 
     Raises:
         WeightsError: If the file is missing, broken, not ours, of a later format, or
-            does not fit the network that it names.
+            does not fit the network of its header.
     """
     path = default_weights_path() if path is None else path
     config, tensors = _read(path)
@@ -106,7 +106,7 @@ def load_weights(
 
 
 def read_config(path: Path | None = None) -> NetworkConfig:
-    """The network that a weights file is of, from its header alone.
+    """The configuration of the network of a weights file, from its header alone.
 
     Raises:
         WeightsError: If the file is missing, broken, not ours or of an unknown network.
@@ -116,7 +116,7 @@ def read_config(path: Path | None = None) -> NetworkConfig:
 
 
 def read_facts(path: Path | None = None) -> dict[str, Any]:
-    """What `save_weights` was told about the training.
+    """The facts about the training that `save_weights` was given.
 
     Raises:
         WeightsError: If the file is missing, broken or not ours.
@@ -126,7 +126,7 @@ def read_facts(path: Path | None = None) -> dict[str, Any]:
 
 
 def weights_hash(path: Path | None = None) -> str:
-    """SHA-256 of a weights file, hexadecimal, to tell one from another.
+    """SHA-256 of a weights file, hexadecimal.
 
     Raises:
         WeightsError: If the file cannot be read.
@@ -183,7 +183,7 @@ def _header(path: Path) -> dict[str, Any]:
     if header.get("format_version") != FORMAT_VERSION:
         raise WeightsError(
             f"{path}: weights of format {header.get('format_version')!r}, but this "
-            f"program reads {FORMAT_VERSION}; install the version that wrote it "
+            f"version reads format {FORMAT_VERSION}; install the version that wrote it "
             f"({header.get('package_version', 'unknown')})."
         )
     for key in ("network", "facts"):

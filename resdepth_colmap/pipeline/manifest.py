@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from resdepth_colmap.errors import WorkspaceError
-from resdepth_colmap.io.files import write_whole
+from resdepth_colmap.io.files import write_whole, writing
 from resdepth_colmap.pipeline.fingerprints import Fingerprints
 from resdepth_colmap.scene import View
 
@@ -191,17 +191,10 @@ class Manifest:
             entries = (_line(*key, entry) for key, entry in self._entries.items())
             write_whole(self.path, _text([*self.fingerprints.all(), *entries]))
             return
-        try:
-            with self.path.open("ab") as file:
-                file.write(text)
-                file.flush()
-                os.fsync(file.fileno())
-        except OSError as error:
-            reason = error.strerror or str(error)
-            raise WorkspaceError(
-                f"{self.path}: cannot write ({reason}); check the permissions of its "
-                "folder and the free space of the disk."
-            ) from error
+        with writing(self.path), self.path.open("ab") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
 
 
 def key_of(facts: Any) -> str:

@@ -53,7 +53,7 @@ def test_the_range_scales_with_the_scene(scale: float) -> None:
 
 @pytest.mark.parametrize("sources", [[], [0]])
 def test_without_points_or_another_place_there_is_no_range(sources: list[int]) -> None:
-    with pytest.raises(ValueError, match=r"view\.png.*stands elsewhere"):
+    with pytest.raises(ValueError, match=r"view\.png.*has a baseline"):
         depth_range(ROW, 0, sources)
 
 

@@ -15,6 +15,7 @@ from resdepth_colmap.network.network_config import NetworkConfig
 from resdepth_colmap.network.unet import ResDepthNet
 from resdepth_colmap.network.weights import (
     load_weights,
+    read_config,
     read_facts,
     save_weights,
     weights_hash,
@@ -187,12 +188,31 @@ def test_the_packages_own_weights_lie_in_the_package() -> None:
     assert path.parts[-3:] == ("resdepth_colmap", "weights", "resdepth.safetensors")
 
 
+def _rewritten(path: Path, change: Callable[[dict[str, object]], object]) -> None:
+    """Change the options of the network in the header of a file."""
+    with safe_open(path, framework="pt") as opened:
+        header = json.loads(opened.metadata()[weights.FORMAT])
+    change(header["network"])
+    save_file(load_file(path), path, {weights.FORMAT: json.dumps(header)})
+
+
 def test_a_file_from_before_an_option_is_of_a_network_without_it(file: Path) -> None:
     before = ResDepthNet(dataclasses.replace(CONFIG, source_depth=False))
     save_weights(file, before)
-    with safe_open(file, framework="pt") as opened:
-        header = json.loads(opened.metadata()[weights.FORMAT])
-    del header["network"]["source_depth"]
-    metadata = {weights.FORMAT: json.dumps(header)}
-    save_file(load_file(file), file, metadata)
+    _rewritten(file, lambda options: options.pop("source_depth"))
     assert load_weights(file).config == before.config
+
+
+@pytest.mark.parametrize("value", [True, False])
+def test_a_file_with_the_old_name_of_an_option_is_loaded(
+    file: Path, value: bool
+) -> None:
+    network = ResDepthNet(dataclasses.replace(CONFIG, source_resampling=value))
+    save_weights(file, network)
+
+    def rename(options: dict[str, object]) -> None:
+        options["second_look"] = options.pop("source_resampling")
+
+    _rewritten(file, rename)
+    assert load_weights(file).config == network.config
+    assert read_config(file) == network.config

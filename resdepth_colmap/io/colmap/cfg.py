@@ -27,7 +27,7 @@ class SourceSpec:
     Attributes:
         kind: `auto`: those with the most shared points; `all`: all other images;
             `explicit`: those of `names`.
-        num_auto: How many at most, where `kind` is auto (COLMAP's own: 20); else 0.
+        num_auto: How many at most, where `kind` is auto (COLMAP's default: 20); else 0.
         names: Image names, where `kind` is explicit; else ().
     """
 
@@ -101,7 +101,7 @@ def _format(spec: SourceSpec) -> str:
 
 
 def _lines(path: Path) -> Iterator[tuple[int, str]]:
-    """The lines that say something, with their numbers."""
+    """The lines that are neither blank nor comments, with their numbers."""
     try:
         with reading(path):
             text = path.read_text(encoding="utf-8-sig")

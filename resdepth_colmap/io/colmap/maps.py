@@ -102,9 +102,9 @@ def write_consistency_graph(
     records = np.empty(int(lengths.sum()), "<i4")
     is_index = np.ones(records.size, np.bool_)
     leading = (pixels % width, pixels // width, counts)
-    for place, values in enumerate(leading):
-        records[starts + place] = values
-        is_index[starts + place] = False
+    for offset, values in enumerate(leading):
+        records[starts + offset] = values
+        is_index[starts + offset] = False
     _, sources = np.nonzero(by_pixel[:, pixels].T)
     records[is_index] = np.asarray(image_indices, "<i4")[sources]
     write_whole(path, f"{width}&{height}&1&".encode("ascii") + records.tobytes())

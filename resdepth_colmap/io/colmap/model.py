@@ -32,7 +32,7 @@ _ANGLE_PERCENTILE = 75.0  # COLMAP's choice for the sources of its PatchMatch
 
 
 def read_scene(sparse_path: Path, images_path: Path, workspace_path: Path) -> Scene:
-    """Read cameras, poses, and what the sparse points say of the views.
+    """Read cameras, poses, and the statistics of the sparse points.
 
     Images without a pose are left out.
 
@@ -104,7 +104,7 @@ def _about(view: View, origin: Matrix) -> View:
 
 
 def read_image_indices(sparse_path: Path) -> dict[int, int]:
-    """The place of each image, by its id, among those of COLMAP's MVSModel.
+    """The index of each image, by its id, among those of COLMAP's MVSModel.
 
     COLMAP takes the images with a pose as the model has them, which need not be by
     ascending ids. Its consistency graphs count like that.
@@ -138,7 +138,7 @@ def _scene_with_points(
 ) -> Scene:
     depth_range = np.array(mvs_model.compute_depth_ranges(), dtype=np.float64)
     has_points = depth_range[:, 1] > 0  # COLMAP says (-1, -1) where there are none
-    if not has_points.any():  # points without tracks say nothing of the views
+    if not has_points.any():  # points without tracks give no statistics
         return Scene(views=views, num_points=num_points)
     shared = _square(mvs_model.compute_shared_points())
     angles = _square(mvs_model.compute_triangulation_angles(_ANGLE_PERCENTILE))
@@ -153,7 +153,7 @@ def _scene_with_points(
 
 
 def _square(rows: list[dict[int, float]]) -> Matrix:
-    """A symmetric matrix of what COLMAP says of each pair of images; 0 elsewhere."""
+    """A symmetric matrix of COLMAP's value for each pair of images; 0 elsewhere."""
     matrix = np.zeros((len(rows), len(rows)), dtype=np.float64)
     for row, values in enumerate(rows):
         for column, value in values.items():

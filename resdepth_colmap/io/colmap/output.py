@@ -1,4 +1,4 @@
-"""Where refined maps go: a COLMAP workspace of their own, or the user's, in place."""
+"""Where refined maps go: a new COLMAP workspace, or the given one, in place."""
 
 import contextlib
 import dataclasses
@@ -39,7 +39,7 @@ BACKDROP_FOLDER = "backdrop_masks"
 """In the output: masks of a uniform backdrop; they are made again where they lack."""
 
 OVERVIEW_NAME = "overview.png"
-"""The picture of the whole workspace, in its output."""
+"""The picture of all images of the workspace, in its output."""
 
 _MODEL_FILES = frozenset(
     f"{part}{suffix}" for part in MODEL_PARTS for suffix in (".bin", ".txt")

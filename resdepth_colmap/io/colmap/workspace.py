@@ -108,7 +108,7 @@ def open_workspace(path: Path) -> Workspace:
 
     Raises:
         WorkspaceError: If there is no workspace, more than one, or one in PMVS's
-            layout; the message says what to point at.
+            layout; the message names the folder to use.
     """
     try:
         return _find(path)

@@ -1,8 +1,7 @@
 """COLMAP's own fusion of a workspace."""
 
-import contextlib
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -98,7 +97,9 @@ def _run(
 ) -> PointCloud:
     import pycolmap
 
-    with tempfile.TemporaryDirectory() as folder, _quiet(pycolmap):
+    from resdepth_colmap.io.colmap.reconstruction import quiet_pycolmap
+
+    with tempfile.TemporaryDirectory() as folder, quiet_pycolmap():
         path = Path(folder) / "fused.ply"
         try:
             model = pycolmap.stereo_fusion(
@@ -135,14 +136,3 @@ def _options(
 def _nothing() -> PointCloud:
     none = np.zeros((0, 3), np.float32)
     return PointCloud(points=none, colors=none.astype(np.uint8), normals=none)
-
-
-@contextlib.contextmanager
-def _quiet(pycolmap: Any) -> Iterator[None]:
-    """Keep COLMAP's log off stderr: what matters is raised."""
-    level = pycolmap.logging.minloglevel
-    pycolmap.logging.minloglevel = int(pycolmap.logging.FATAL)
-    try:
-        yield
-    finally:
-        pycolmap.logging.minloglevel = level
