@@ -5,9 +5,12 @@ from pathlib import Path
 import torch
 from planes import write_plane_workspace
 
+from resdepth_colmap.io.colmap.model import read_scene
+from resdepth_colmap.io.colmap.workspace import Workspace, open_workspace
 from resdepth_colmap.network.network_config import NetworkConfig
 from resdepth_colmap.network.unet import ResDepthNet
 from resdepth_colmap.network.weights import save_weights
+from resdepth_colmap.scene import Scene
 
 WEIGHTS_NAME = "identity.safetensors"
 
@@ -17,6 +20,13 @@ def plane_folder(path: Path, **options: object) -> Path:
     folder = path / "scene"
     write_plane_workspace(folder, **options)  # type: ignore[arg-type] # passed on
     return folder
+
+
+def opened(folder: Path) -> tuple[Workspace, Scene]:
+    """A workspace and its scene."""
+    workspace = open_workspace(folder)
+    scene = read_scene(workspace.sparse_path, workspace.images_path, workspace.path)
+    return workspace, scene
 
 
 def identity_weights(path: Path, seed: int = 0, source_depth: bool = False) -> Path:

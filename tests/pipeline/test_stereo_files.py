@@ -8,28 +8,20 @@ import pytest
 from fake_matcher import DEPTH, FakeMatcher, installed
 from PIL import Image
 from planes import NAMES
-from workspaces import plane_folder
+from workspaces import opened, plane_folder
 
 from resdepth_colmap.config import MaskConfig, StereoBackend, StereoConfig
 from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.io.colmap.cfg import read_sources
 from resdepth_colmap.io.colmap.maps import read_depth_map, read_normal_map
-from resdepth_colmap.io.colmap.model import read_image_indices, read_scene
-from resdepth_colmap.io.colmap.workspace import Workspace, open_workspace
+from resdepth_colmap.io.colmap.model import read_image_indices
 from resdepth_colmap.pipeline.masks import with_masks
 from resdepth_colmap.pipeline.stereo.stage import StereoReport, stereo_workspace
-from resdepth_colmap.scene import Scene
 
 
 @pytest.fixture(autouse=True)
 def matcher(monkeypatch: pytest.MonkeyPatch) -> FakeMatcher:
     return installed(monkeypatch)
-
-
-def opened(folder: Path) -> tuple[Workspace, Scene]:
-    workspace = open_workspace(folder)
-    scene = read_scene(workspace.sparse_path, workspace.images_path, workspace.path)
-    return workspace, scene
 
 
 def match(

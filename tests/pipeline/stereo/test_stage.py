@@ -10,14 +10,12 @@ import pytest
 from click.testing import CliRunner
 from fake_matcher import DEPTH, FakeMatcher, installed
 from planes import NAMES
-from workspaces import identity_weights, plane_folder
+from workspaces import identity_weights, opened, plane_folder
 
 from resdepth_colmap.cli.main import main
 from resdepth_colmap.config import StereoBackend, StereoConfig
 from resdepth_colmap.errors import WorkspaceError
 from resdepth_colmap.io.colmap.maps import read_depth_map, write_depth_map
-from resdepth_colmap.io.colmap.model import read_scene
-from resdepth_colmap.io.colmap.workspace import Workspace, open_workspace
 from resdepth_colmap.pipeline.stereo import passes as stereo_passes
 from resdepth_colmap.pipeline.stereo import stage as stereo_stage
 from resdepth_colmap.pipeline.stereo.stage import (
@@ -26,7 +24,6 @@ from resdepth_colmap.pipeline.stereo.stage import (
     stereo_workspace,
 )
 from resdepth_colmap.progress import Advance, SilentProgress
-from resdepth_colmap.scene import Scene
 
 CPU = StereoBackend.CPU
 KINDS = ("photometric", "geometric")
@@ -35,12 +32,6 @@ KINDS = ("photometric", "geometric")
 @pytest.fixture(autouse=True)
 def matcher(monkeypatch: pytest.MonkeyPatch) -> FakeMatcher:
     return installed(monkeypatch)
-
-
-def opened(folder: Path) -> tuple[Workspace, Scene]:
-    workspace = open_workspace(folder)
-    scene = read_scene(workspace.sparse_path, workspace.images_path, workspace.path)
-    return workspace, scene
 
 
 def match(folder: Path, *, overwrite: bool = False, **options: object) -> StereoReport:

@@ -7,18 +7,15 @@ import pycolmap
 import pytest
 from fake_matcher import FakeMatcher, installed
 from planes import NAMES
-from workspaces import plane_folder
+from workspaces import opened, plane_folder
 
 from resdepth_colmap.config import StereoBackend, StereoConfig
 from resdepth_colmap.io.colmap.maps import read_depth_map, write_depth_map
-from resdepth_colmap.io.colmap.model import read_scene
-from resdepth_colmap.io.colmap.workspace import Workspace, open_workspace
 from resdepth_colmap.pipeline.stereo.stage import (
     StereoReport,
     choose_backend,
     stereo_workspace,
 )
-from resdepth_colmap.scene import Scene
 
 AUTO, CPU = StereoBackend.AUTO, StereoBackend.CPU
 
@@ -26,12 +23,6 @@ AUTO, CPU = StereoBackend.AUTO, StereoBackend.CPU
 @pytest.fixture(autouse=True)
 def matcher(monkeypatch: pytest.MonkeyPatch) -> FakeMatcher:
     return installed(monkeypatch)
-
-
-def opened(folder: Path) -> tuple[Workspace, Scene]:
-    workspace = open_workspace(folder)
-    scene = read_scene(workspace.sparse_path, workspace.images_path, workspace.path)
-    return workspace, scene
 
 
 def match(folder: Path, backend: StereoBackend = AUTO) -> StereoReport:
